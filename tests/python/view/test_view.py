@@ -9,13 +9,11 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from processes import O80, Running, end_of, run_python
+from processes import O80, WAIT, Running, end_of, run_python
 
 import o80
 from o80.view import page_file
 from o80.view.page_file import write_page
-
-TIMEOUT = 60.0
 
 
 def look(url: str) -> dict[str, Any]:
@@ -25,7 +23,7 @@ def look(url: str) -> dict[str, Any]:
         b"{}",
         {"Authorization": f"Bearer {parts.query.removeprefix('token=')}"},
     )
-    with urllib.request.urlopen(request, timeout=TIMEOUT) as answer:
+    with urllib.request.urlopen(request, timeout=WAIT) as answer:
         found: dict[str, Any] = json.load(answer)
         return found
 
@@ -90,7 +88,7 @@ def test_the_command_prints_the_address_that_is_bound(arm: o80.Frontend) -> None
     with Running(O80, "view", arm.segment) as running:
         assert look(running.stdout.readline().strip())["source"] == arm.segment
         running.send_signal(signal.SIGINT)
-        assert running.wait(TIMEOUT) == 0
+        assert running.wait(WAIT) == 0
 
 
 def test_a_page_in_a_file_is_refused_with_a_cure(

@@ -7,13 +7,12 @@ from http.client import HTTPConnection
 from typing import Any
 
 import pytest
+from processes import WAIT
 
 import o80
 from o80.view.head import LARGEST_HEAD, LARGEST_REQUEST, Head, Refused, take_head
 from o80.view.serve import page_server
 from o80.view.server import PageServer
-
-TIMEOUT = 60.0
 
 
 @pytest.fixture
@@ -29,7 +28,7 @@ def server(arm: o80.Frontend, monkeypatch: pytest.MonkeyPatch) -> Iterator[PageS
 def ask(
     server: PageServer, method: str, target: str, headers: dict[str, str], body: str = ""
 ) -> tuple[int, str]:
-    connection = HTTPConnection("127.0.0.1", server.port, timeout=TIMEOUT)
+    connection = HTTPConnection("127.0.0.1", server.port, timeout=WAIT)
     try:
         connection.request(method, target, body, headers)
         answer = connection.getresponse()
@@ -136,7 +135,7 @@ def test_a_halt_is_always_allowed_and_a_resume_only_with_control(segment: str) -
         with page_server([segment]) as server:
             code, answer = post(server, "/halt", {"segment": segment, "reason": "the ball"})
             assert code == 200
-            frontend.wait_for(frontend.published + 2, timeout=TIMEOUT)
+            frontend.wait_for(frontend.published + 2, timeout=WAIT)
             halt = frontend.halted
             assert halt is not None
             assert halt.number == answer["halt"]
@@ -185,7 +184,7 @@ def test_only_shown_segments_are_halted(server: PageServer) -> None:
 
 def answer_to(server: PageServer, request: str) -> str:
     """All that is sent until the server closes the connection."""
-    with socket.create_connection(("127.0.0.1", server.port), TIMEOUT) as connection:
+    with socket.create_connection(("127.0.0.1", server.port), WAIT) as connection:
         connection.sendall(request.encode("latin-1"))
         return connection.makefile(encoding="latin-1", newline="").read()
 
