@@ -50,17 +50,12 @@ if user := int(sys.argv.pop(1)):
     os.setuid(user)
     ctypes.CDLL(None).prctl(4, 1)  # PR_SET_DUMPABLE: otherwise root owns its /proc/self
 """
-COMMANDS = (
-    BECOME
-    + """
+COMMANDS = """
 for line in sys.stdin:
     words, environment = json.loads(line)
     print(json.dumps(say(words, **environment) if words else viewed()), flush=True)
 """
-)
-SERVE = (
-    BECOME
-    + """
+SERVE = """
 with o80.Backend("arm", 1, bursting=True, permission=int(sys.argv[1], 8)) as backend:
     backend.publish([0.0])
     print("ready", flush=True)
@@ -69,7 +64,6 @@ if "stay" in sys.argv:
     print("ended", flush=True)
     sys.stdin.read()
 """
-)
 
 
 class Machine:
@@ -84,7 +78,8 @@ class Machine:
         self.process = self.started(COMMANDS)
 
     def started(self, program: str, *words: str) -> Running:
-        return Running(sys.executable, "-c", program, self.user, *words, env=self.environment)
+        words = (BECOME + program, self.user, *words)
+        return Running(sys.executable, "-c", *words, env=self.environment)
 
     def close(self) -> None:
         self.process.communicate(timeout=WAIT)
