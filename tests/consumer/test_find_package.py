@@ -73,15 +73,6 @@ def test_a_robot_library_needs_no_library_of_o80_and_shows_only_what_it_exports(
     assert ctypes.CDLL(str(robot)).stranger() == 1
 
 
-def test_the_example_over_udp_builds_outside_the_tree(tmp_path: Path) -> None:
-    source, build = tmp_path / "source", tmp_path / "build"
-    shutil.copytree(ROOT / "examples" / "udp_arm", source)
-    run("cmake", "-S", source, "-B", build, f"-Do80_ROOT={PACKAGE}")
-    run("cmake", "--build", build)
-
-    assert "tolerated" in {option.name for option in o80.robots.load(build / "udp_arm.so").options}
-
-
 @pytest.fixture(scope="session")
 def scale(tmp_path_factory: pytest.TempPathFactory) -> o80.robots.Robot:
     """A robot library made by a compiler alone."""

@@ -1,14 +1,28 @@
-"""Mistakes in a driver class are errors with a sentence, when the driver is compiled."""
+"""Compilers: errors of a mistaken driver class are sentences, and a right one reads few headers."""
 
+import shutil
 import subprocess
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
 import pytest
-from compilers import COMPILERS
 
 import o80
+
+CLANG = "clang++-19"
+COMPILERS = [
+    pytest.param("g++", id="g++"),
+    pytest.param(
+        CLANG,
+        id=CLANG,
+        marks=[
+            pytest.mark.check,
+            pytest.mark.skipif(shutil.which(CLANG) is None, reason=f"{CLANG} is not installed"),
+        ],
+    ),
+]
+
 
 #: A driver. A mistake stands in the place of one of its parts.
 DRIVER = """
@@ -122,3 +136,36 @@ def test_the_first_error_says_what_is_wrong(
 def test_without_the_mistakes_they_compile(compiled_headers: Flags) -> None:
     for place, right in {(place, right) for place, _, _, right in MISTAKES.values()}:
         assert errors("g++", place, right, compiled_headers("g++")) == [], right
+
+
+ROBOT = Path(__file__).parent / "headers_only.cpp"
+
+#: All of it: no frontend, backend, lane, spinner or lock. Every robot is compiled again when one of
+#: these changes.
+NEEDED = """
+base/error base/nearest_name base/time base/version
+describe/defaults describe/describe describe/described describe/face describe/for_each
+describe/hooks describe/options describe/rows describe/schema describe/schema_bytes
+describe/shown_model
+robot robot/driver robot/driver_checks robot/make_table robot/plant_requests robot/table
+runtime/request_server runtime/robot_types
+"""
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_a_robot_library_reads_only_what_a_robot_needs(compiler: str) -> None:
+    compiled = subprocess.run(
+        [compiler, *LANGUAGE, "-MM", ROBOT],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    prefix = f"{HEADERS / 'o80'}/"
+    read = {
+        word.removeprefix(prefix).removesuffix(".hpp")
+        for word in compiled.stdout.replace("\\\n", " ").split()
+        if word.startswith(prefix)
+    }
+
+    assert "robot/make_table" in read
+    assert read - set(NEEDED.split()) == set()

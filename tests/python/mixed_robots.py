@@ -2,6 +2,7 @@
 
 import itertools
 import os
+from collections.abc import Mapping
 from enum import IntEnum
 from typing import Any
 
@@ -47,13 +48,50 @@ def is_enum(described: Any) -> bool:
     return isinstance(described, type) and issubclass(described, IntEnum)
 
 
-def fill(random: np.random.Generator, array: np.ndarray[Any, np.dtype[Any]]) -> None:
-    """Fills every field at random with 0 or 3, which all types hold, and Mode has labels for."""
-    if array.dtype.names is None:
-        array[...] = random.choice([0, 3], array.shape).astype(array.dtype)
-        return
-    for name in array.dtype.names:
-        fill(random, array[name])
+def drawn(random: np.random.Generator, described: Any, lead: tuple[int, ...] = ()) -> Any:
+    """Draws values of a type: a mapping for a struct, an array (*lead, ...) otherwise."""
+    if isinstance(described, Mapping):
+        return {name: drawn(random, inner, lead) for name, inner in described.items()}
+    if is_enum(described):
+        return random.choice([*described], lead).astype(np.int64)
+    element, shape = np.dtype(described).subdtype or (np.dtype(described), ())
+    if element.names is not None:
+        kinds = [(name, element.fields[name][0]) for name in element.names]  # without padding
+        values = np.zeros((*lead, *shape), kinds)
+        for name, kind in kinds:
+            values[name] = drawn(random, kind, values.shape)
+        return values
+    if element.kind == "f":
+        return random.normal(size=(*lead, *shape)).astype(element)
+    low, high = (0, 1) if element.kind == "b" else (np.iinfo(element).min, np.iinfo(element).max)
+    dtype = np.uint8 if element.kind == "b" else element
+    return random.integers(low, high, (*lead, *shape), dtype, endpoint=True).astype(element)
+
+
+def many(members: Any) -> tuple[Any, tuple[int, ...]]:
+    """Returns a group's type and (count,), or () for a single actuator."""
+    if not isinstance(members, tuple):
+        return members, ()
+    return members[0], (members[1] if isinstance(members[1], int) else len(members[1]),)
+
+
+class Drawn:
+    """Endless list of random rows of a robot with described types."""
+
+    def __init__(self, groups: Mapping[str, Any], sensors: Any, seed: int) -> None:
+        self.groups, self.sensors = groups, sensors
+        self._random = np.random.default_rng(seed)
+        self._rows: list[tuple[Any, Any]] = []
+
+    def row(self, number: int) -> tuple[Any, Any]:
+        """Returns states and sensor values of a row, for `Backend.publish`."""
+        while len(self._rows) <= number:
+            states = {
+                name: drawn(self._random, *many(members)) for name, members in self.groups.items()
+            }
+            sensors = None if self.sensors is None else drawn(self._random, self.sensors)
+            self._rows.append((states, sensors))
+        return self._rows[number]
 
 
 _names = (f"test-mixed-{os.getpid()}-{i}" for i in itertools.count())
@@ -61,31 +99,17 @@ _names = (f"test-mixed-{os.getpid()}-{i}" for i in itertools.count())
 
 def recorded(groups: Any, sensors: Any, seed: int, rows: int = 5) -> o80.History:
     """Returns rows published by a robot of these types."""
-    random = np.random.default_rng(seed)
-    name = next(_names)
-    options: Any = {"extended": sensors, "bursting": True}
-    with o80.Backend(name, groups, **options) as backend:
-        backend.publish(_random(random, backend._observed), _random(random, backend._extended))
+    name, drawn_rows = next(_names), Drawn(groups, sensors, seed)
+    with o80.Backend(name, groups, extended=sensors, bursting=True) as backend:
+        backend.publish(*drawn_rows.row(0))
         with o80.Frontend(name) as frontend:
-            for row in range(rows):
-                if row > 0:
-                    burst = frontend.burst(1, wait=False)
-                    backend.step()
-                backend.publish(
-                    _random(random, backend._observed), _random(random, backend._extended)
-                )
-            assert rows == 1 or burst.done
+            for row in range(1, rows):
+                frontend.burst(1, wait=False)
+                backend.step()
+                backend.publish(*drawn_rows.row(row))
             history = frontend.history()
     o80.clean(name)
     return history
-
-
-def _random(random: np.random.Generator, like: Any) -> Any:
-    array = np.array(like)
-    if array.dtype.itemsize == 0:
-        return None
-    fill(random, array)
-    return array
 
 
 # each example starts a backend: shrinking would exceed a test's timeout

@@ -1,12 +1,22 @@
-"""Runs the program o80, and waits for processes that are not children."""
+"""Runs programs, o80 among them, and waits for processes that are not children."""
 
 import os
 import select
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import IO, Any, TypeVar
 
+Found = TypeVar("Found")
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = (
+    *("python/o80", "devices/o80_devices", "gateways/ros2/o80_ros2", "robots/arms/python"),
+    *("robots/pam/python", "simulators/mujoco/python", "apps/table_tennis/o80_table_tennis"),
+)
+PRODUCT = [file for package in PACKAGES for file in (ROOT / package).rglob("*.py")]
 WAIT = 60.0  # longer than any end may take [s]
 O80 = str(Path(sys.executable).parent / "o80")
 
@@ -31,6 +41,37 @@ def run_o80(*words: object, **options: Any) -> "subprocess.CompletedProcess[str]
     done = run_program(O80, *words, **options)
     assert "Traceback" not in done.stderr
     return done
+
+
+def o80_says(*words: object, **options: Any) -> str:
+    """Returns output and errors of the program o80; see run_program()."""
+    done = run_o80(*words, **options)
+    return done.stdout + done.stderr
+
+
+class Running(subprocess.Popen[str]):
+    """A program with pipes, unless options say otherwise; the end of its block kills it."""
+
+    stdin: IO[str]
+    stdout: IO[str]
+    stderr: IO[str]
+
+    def __init__(self, *words: object, **options: Any) -> None:
+        pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+        super().__init__([*map(str, words)], **pipes | {"text": True} | options)
+
+    def __exit__(self, *_: object) -> None:
+        self.kill()
+        super().__exit__(None, None, None)
+
+
+def until(told: Callable[[], Found]) -> Found:
+    """Asks again and again; returns the first answer that is true."""
+    end = time.monotonic() + WAIT
+    while not (answer := told()):
+        assert time.monotonic() < end
+        time.sleep(0.001)
+    return answer
 
 
 def end_of(process: int) -> None:

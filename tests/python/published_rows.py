@@ -3,6 +3,7 @@
 The expected numbers come from nested values and field names, without any offsets.
 """
 
+import csv
 import json
 import math
 import pickle
@@ -16,7 +17,7 @@ import numpy as np
 import pyarrow.parquet
 from mcap.reader import make_reader
 from minari import MinariDataset
-from mixed_robots import is_enum
+from mixed_robots import Drawn, many
 from numpy.typing import NDArray
 from processes import WAIT
 from rosbags.highlevel import AnyReader
@@ -33,26 +34,6 @@ from o80.view.base64_arrays import packed
 from o80.view.curves import Panels
 
 Columns = dict[str, NDArray[Any]]
-
-
-def drawn(random: np.random.Generator, described: Any, lead: tuple[int, ...] = ()) -> Any:
-    """Draws values of a type: a mapping for a struct, an array (*lead, ...) otherwise."""
-    if isinstance(described, Mapping):
-        return {name: drawn(random, inner, lead) for name, inner in described.items()}
-    if is_enum(described):
-        return random.choice([*described], lead).astype(np.int64)
-    element, shape = np.dtype(described).subdtype or (np.dtype(described), ())
-    if element.names is not None:
-        kinds = [(name, element.fields[name][0]) for name in element.names]  # without padding
-        values = np.zeros((*lead, *shape), kinds)
-        for name, kind in kinds:
-            values[name] = drawn(random, kind, values.shape)
-        return values
-    if element.kind == "f":
-        return random.normal(size=(*lead, *shape)).astype(element)
-    low, high = (0, 1) if element.kind == "b" else (np.iinfo(element).min, np.iinfo(element).max)
-    dtype = np.uint8 if element.kind == "b" else element
-    return random.integers(low, high, (*lead, *shape), dtype, endpoint=True).astype(element)
 
 
 def numbers(path: str, value: Any) -> Iterator[tuple[str, Any]]:
@@ -77,28 +58,8 @@ def element(value: Any, index: int) -> Any:
     return value[index]
 
 
-def many(members: Any) -> tuple[Any, tuple[int, ...]]:
-    """Returns a group's type and (count,), or () for a single actuator."""
-    return (members[0], (members[1],)) if isinstance(members, tuple) else (members, ())
-
-
-class Published:
-    """Endless list of random rows of a robot with described types."""
-
-    def __init__(self, groups: Mapping[str, Any], sensors: Any, seed: int) -> None:
-        self.groups, self.sensors = groups, sensors
-        self._random = np.random.default_rng(seed)
-        self._rows: list[tuple[Any, Any]] = []
-
-    def row(self, number: int) -> tuple[Any, Any]:
-        """Returns states and sensor values of a row, for `Backend.publish`."""
-        while len(self._rows) <= number:
-            states = {
-                name: drawn(self._random, *many(members)) for name, members in self.groups.items()
-            }
-            sensors = None if self.sensors is None else drawn(self._random, self.sensors)
-            self._rows.append((states, sensors))
-        return self._rows[number]
+class Published(Drawn):
+    """Random rows and their expected columns."""
 
     def swap(self, one: int, other: int) -> None:
         """Swaps two rows."""
@@ -309,16 +270,25 @@ def played(path: Path, segment: str, expected: Columns) -> None:
             same(expected, columns_in(frontend.history()))
 
 
+def messages_of(path: Path, topic: str) -> list[tuple[int, Any]]:
+    """Log times and messages of a topic."""
+    with AnyReader([path]) as reader:
+        return [
+            (time, reader.deserialize(raw, each.msgtype))
+            for each, time, raw in reader.messages()
+            if each.topic == topic
+        ]
+
+
 def messages(path: Path, segment: str, expected: Columns) -> None:
     """Checks the messages with the libraries mcap and rosbags."""
     topic = topic_of(segment)
     with AnyReader([path]) as reader:
-        found = [(each, raw) for each, _, raw in reader.messages() if each.topic == topic]
-        rows: list[Any] = [reader.deserialize(raw, each.msgtype) for each, raw in found]
+        found = [bytes(raw) for each, _, raw in reader.messages() if each.topic == topic]
     with path.open("rb") as file:
         of_mcap = [message.data for _, _, message in make_reader(file).iter_messages([topic])]
-    assert of_mcap == [bytes(raw) for _, raw in found]
-    for i, row in enumerate(rows):
+    assert of_mcap == found
+    for i, (_, row) in enumerate(messages_of(path, topic)):
         parts = (getattr(row, name, []) for name in ("desired", "observed", "extended"))
         assert leaves([*parts]) == [values[i] for values in expected.values()]
 
@@ -336,8 +306,12 @@ def leaves(value: Any) -> list[Any]:
 
 
 def files(history: o80.History, folder: Path, expected: Columns) -> None:
-    for suffix in (".npz", ".h5", ".parquet"):
+    for suffix in (".npz", ".h5", ".parquet", ".csv"):
         write(folder / f"run{suffix}", {"robot": history})
+    with (folder / "run.csv").open(newline="") as file:
+        rows = [*csv.DictReader(file)]
+    texts = {name: [*map(str, values.tolist())] for name, values in expected.items()}
+    assert {name: [row[name] for row in rows] for name in texts} == texts
     arrays = np.load(folder / "run.npz").items()
     same(expected, {name.removeprefix("robot/"): values for name, values in arrays})
     with h5py.File(folder / "run.h5") as file:

@@ -130,6 +130,22 @@ class Joint:
         self._may_fail("stop")
 
 
+class Obedient:
+    """Joints that are where they are told to be."""
+
+    actuators: tuple[str, ...] = ("elbow",)
+    simulated = True
+
+    def __init__(self) -> None:
+        self.places = np.zeros(len(self.actuators))
+
+    def write(self, desired: Desired) -> None:
+        self.places = np.array(desired.states)
+
+    def read(self, reading: Reading) -> None:
+        reading.observed = self.places
+
+
 class Paced:
     """Paces the loop with `wait`."""
 

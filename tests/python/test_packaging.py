@@ -3,14 +3,13 @@
 import itertools
 import os
 import re
-import subprocess
-import sys
 import tomllib
 from importlib.metadata import requires, version
 from pathlib import Path
 from typing import Any
 
 import pytest
+from processes import run_python
 
 import o80
 from o80.base.installation import check_version
@@ -39,7 +38,7 @@ def test_the_core_needs_numpy_and_the_command_line_only() -> None:
 
 
 @pytest.mark.parametrize("folder", [".", *OTHERS])
-def test_each_package_has_the_version_of_this_tree_and_asks_for_the_others_in_it(
+def test_each_package_is_installed_in_the_version_of_this_tree_and_asks_for_the_others_in_it(
     folder: str,
 ) -> None:
     project = pyproject(folder)["project"]
@@ -47,12 +46,19 @@ def test_each_package_has_the_version_of_this_tree_and_asks_for_the_others_in_it
     needed = itertools.chain(project["dependencies"], *extras)
     pins = {name.partition("==")[2] for name in needed if re.match(r"o80\b", name)}
 
-    assert project["version"] == o80.__version__
+    assert project["version"] == version(project["name"]) == o80.__version__
+    plain = [name for name in requires(project["name"]) or [] if ";" not in name]
+    assert sorted(plain) == sorted(project["dependencies"])
     assert pins == (set() if folder == "." else {o80.__version__})
 
 
 def test_the_citation_names_the_version() -> None:
     assert f"\nversion: {o80.__version__}\n" in (ROOT / "CITATION.cff").read_text()
+
+
+def before(folder: Path) -> dict[str, str]:
+    """The environment of an interpreter that imports from this folder first."""
+    return os.environ | {"PYTHONPATH": f"{folder}:{os.environ.get('PYTHONPATH', '')}"}
 
 
 def test_packages_of_another_version_than_o80_refuse_to_be_imported(tmp_path: Path) -> None:
@@ -64,9 +70,7 @@ def test_packages_of_another_version_than_o80_refuse_to_be_imported(tmp_path: Pa
     program = "import importlib, sys\nfor name in sys.argv[1:]:\n"
     program += "  try: importlib.import_module(name.replace('-', '_'))\n"
     program += "  except ImportError as error: print(error)\n"
-    environment = os.environ | {"PYTHONPATH": f"{tmp_path}:" + os.environ.get("PYTHONPATH", "")}
-    command = [sys.executable, "-c", program, *names]
-    said = subprocess.check_output(command, env=environment, text=True).splitlines()
+    said = run_python("-c", program, *names, env=before(tmp_path)).stdout.splitlines()
 
     fits = f"does not fit o80 {o80.__version__}: install both in one version, pip install"
     assert said == [f"{name} 9.9 {fits} {name}=={o80.__version__}" for name in names]
@@ -80,20 +84,9 @@ def test_files_of_another_version_than_the_compiled_module_refuse_to_be_imported
     (tmp_path / "o80").mkdir()
     stale = files.replace(f'__version__ = "{o80.__version__}"', '__version__ = "9.9"')
     (tmp_path / "o80/__init__.py").write_text(f"__path__.append({str(INSTALLED)!r})\n{stale}")
-    environment = os.environ | {"PYTHONPATH": f"{tmp_path}:" + os.environ.get("PYTHONPATH", "")}
-    command = [sys.executable, "-c", "import o80"]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    done = run_python("-c", "import o80", code=1, env=before(tmp_path))
 
     assert f"have version 9.9, its compiled module {o80.__version__}" in done.stderr
-
-
-@pytest.mark.parametrize("folder", [".", *OTHERS])
-def test_the_installed_package_is_that_of_the_tree(folder: str) -> None:
-    project = pyproject(folder)["project"]
-
-    assert version(project["name"]) == project["version"]
-    plain = [name.partition(";")[0] for name in requires(project["name"]) or [] if ";" not in name]
-    assert sorted(plain) == sorted(project["dependencies"])
 
 
 def test_packages_share_one_build_backend_and_license() -> None:

@@ -1,5 +1,7 @@
-"""Every block and command of the pages runs as it stands there; some print what they say."""
+"""Blocks of the pages and of the notebook run as they stand there; some print what they say."""
 
+import json
+import os
 import re
 from pathlib import Path
 
@@ -53,46 +55,45 @@ def test_every_command_in_a_sentence_exists_and_has_its_options() -> None:
     assert not wrong
 
 
-def test_the_first_program_about_commands_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    exec(compile(programs("commands.md")[0], "commands.md", "exec"), {})
-
-    assert capsys.readouterr().out == "COMPLETED 0 [0.  0.5]\n"
-
-
-def test_programs_about_commands_print_what_they_say(
-    capsys: pytest.CaptureFixture[str],
+@pytest.mark.parametrize(
+    ("page", "part"),
+    [
+        *(("commands.md", part) for part in ("handle.status.name", "arm.preview(", "seen=seen")),
+        ("from_the_first_o80.md", "print(observation.desired)"),
+    ],
+)
+def test_programs_print_what_they_say(
+    page: str, part: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for verb in ("arm.preview(", "seen=seen"):
-        (program,) = (text for text in programs("commands.md") if verb in text)
-        exec(compile(program, "commands.md", "exec"), {"__name__": "preview"})
+    (program,) = (text for text in programs(page) if part in text)
+    exec(compile(program, page, "exec"), {"__name__": "program"})
 
-        assert capsys.readouterr().out.splitlines() == re.findall(r"print\(.*\)  # (.*)", program)
-
-
-def test_the_program_about_chunks_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_programs("chunks.md", __name__="chunks") == 1
-
-    begins, late, skipped, shift = map(int, capsys.readouterr().out.split())
-    assert (begins > 0, late >= 0, skipped >= 0, shift >= 0) == (True, True, True, True)
+    assert capsys.readouterr().out.splitlines() == re.findall(r"print\(.*\)  # (.*)", program)
 
 
-def test_the_programs_about_streaming_run(capsys: pytest.CaptureFixture[str]) -> None:
-    run_programs("streaming.md", __name__="streaming")
+PRINTED = {  # lines of the programs of a page
+    "chunks.md": [r"[1-9]\d* \d+ \d+ \d+"],
+    "streaming.md": ["0.0", "True"],
+    "groups.md": [
+        r"\(16, 10, 2\)",
+        r"\[ *0\.[0-4]\d* +0\.[0-4]\d*\]",  # follows what the first group was observed at
+        r"\[0.*",  # after the reset
+        r"\(16, 4\) \['observed.shoulder', 'observed.elbow', 'extended.*",
+        r"\{2: BackendHalted\(.*",
+    ],
+    "time.md": [
+        *(r"\(501,\)", r"\(501, 2\)", r"0\.00[0-5]\d*", r"\[0 1 2 3 4 5 6\]", r"\[3 3 4 4 8 8\]"),
+        *(r"\[False  True  True  True  True  True  True\]", r"[1-9]\d* [1-9]\d* \d+"),
+    ],
+}
 
-    assert capsys.readouterr().out.splitlines() == ["0.0", "True"]
 
-
-def test_the_programs_about_groups_run(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_programs("groups.md") == 5
-    printed = capsys.readouterr().out.splitlines()
-    assert printed[0] == "(16, 10, 2)"
-    # the last rows of a burst of 5: the second group follows what the first was observed at
-    followed = [float(number) for number in printed[1].strip("[]").split()]
-    assert all(0 < number < 0.5 for number in followed)
-    assert len(followed) == 2
-    assert printed[2].startswith("[0")  # after the reset
-    assert printed[3].startswith("(16, 4) ['observed.shoulder', 'observed.elbow', 'extended")
-    assert printed[4].startswith("{2: BackendHalted(")
+@pytest.mark.parametrize("page", PRINTED)
+def test_programs_of_a_page_print_what_they_should(
+    page: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_programs(page, __name__=page)
+    assert re.fullmatch("\n".join(PRINTED[page]) + "\n", capsys.readouterr().out)
 
 
 def test_the_programs_about_recording_run_one_after_the_other(tmp_path: Path) -> None:
@@ -103,22 +104,6 @@ def test_the_programs_about_recording_run_one_after_the_other(tmp_path: Path) ->
     assert any(
         "151 (151, 2) []" in each and "('episode', {'number': 2}" in each for each in outputs
     )
-
-
-def test_the_programs_about_joining_run(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_programs("time.md") == 3
-    shape, other, age, *joined, capture = capsys.readouterr().out.splitlines()
-    assert joined == [
-        "[0 1 2 3 4 5 6]",
-        "[3 3 4 4 8 8]",
-        "[False  True  True  True  True  True  True]",
-    ]
-    assert (shape, other) == ("(501,)", "(501, 2)")
-    assert 0 < float(age) < 1 / 180
-    time, error, epoch = capture.split()
-    assert int(time) > 0
-    assert int(error) > 0
-    assert int(epoch) >= 0
 
 
 def test_the_page_about_the_first_o80_names_verbs_of_a_frontend_that_exist() -> None:
@@ -133,7 +118,34 @@ def test_the_page_about_the_first_o80_names_verbs_of_a_frontend_that_exist() -> 
     assert not [verb for verb in verbs if not hasattr(o80.Frontend, verb) and verb != "len"]
 
 
-def test_the_program_about_the_first_o80_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    exec(compile(programs("from_the_first_o80.md")[1], "from_the_first_o80.md", "exec"), {})
+CELLS = json.loads((DOCS / "first_hour.ipynb").read_text())["cells"]
+RUN = """
+import json, sys
+from IPython.core.interactiveshell import InteractiveShell
+shell = InteractiveShell.instance()
+for cell in json.loads(sys.argv[1]):
+    shell.run_cell(cell).raise_error()
+"""
 
-    assert capsys.readouterr().out == "[0.  0.5]\n"
+
+def texts(kind: str) -> list[str]:
+    return ["".join(cell["source"]) for cell in CELLS if cell["cell_type"] == kind]
+
+
+@pytest.mark.check
+def test_all_cells_run_in_ipython_one_after_the_other(tmp_path: Path) -> None:
+    environment = os.environ | {"MPLBACKEND": "agg", "IPYTHONDIR": str(tmp_path / "ipython")}
+    said = run_python("-c", RUN, json.dumps(texts("code")), cwd=tmp_path, env=environment).stdout
+
+    assert "['COMPLETED', 'COMPLETED', 'COMPLETED']" in said
+    assert "outside its limits: from -3 to 3 [rad]" in said
+    assert "the first halt\nNone" in said  # resumed
+    assert "2.0 s\n151 rows recorded\nrecorded: 151 rows, identical" in said
+    assert said.endswith("False\n")  # the robot has stopped
+
+
+def test_the_notebook_holds_no_outputs_and_its_links_lead_to_files() -> None:
+    assert not [cell for cell in CELLS if cell.get("outputs") or cell.get("execution_count")]
+    links = re.findall(r"\]\(([^)#]+)", "\n".join(texts("markdown")))
+    assert len(links) >= 5
+    assert not [link for link in links if not (DOCS / link).exists()]

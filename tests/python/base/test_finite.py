@@ -3,26 +3,16 @@
 import ast
 import json
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from processes import PRODUCT
 
 from o80.base.finite import json_text
 
-ROOT = Path(__file__).resolve().parents[3]
-ROOMS = (
-    "python/o80",
-    "devices/o80_devices",
-    "gateways/ros2/o80_ros2",
-    "robots/arms/python",
-    "robots/pam/python",
-    "simulators/mujoco/python",
-    "apps/table_tennis/o80_table_tennis",
-)
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
     lambda inner: (
@@ -65,9 +55,8 @@ def test_a_field_is_named_with_its_count() -> None:
 
 def test_all_json_of_the_product_is_written_there() -> None:
     found = [
-        f"{file.relative_to(ROOT)}:{node.lineno}"
-        for room in ROOMS
-        for file in (ROOT / room).rglob("*.py")
+        f"{file}:{node.lineno}"
+        for file in PRODUCT
         if file.name != "finite.py"
         for node in ast.walk(ast.parse(file.read_text()))
         if (

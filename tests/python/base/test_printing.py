@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from processes import O80, Running
 
 import o80
 from o80.cli.app import COMMANDS
 
-PROGRAM = Path(sys.executable).parent / "o80"
 ASCII = {"LC_ALL": "C", "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
 WAIT = 120.0  # [s] only ends a hang
 OUTPUTS = ("stdout", "stderr", "both", "ascii")
@@ -34,7 +34,7 @@ open(path, "w").write(" ".join(map(str, codes)))
 
 
 def run(
-    *words: str | Path, on: str = "", program: tuple[str | Path, ...] = (PROGRAM,)
+    *words: str | Path, on: str = "", program: tuple[str | Path, ...] = (O80,)
 ) -> subprocess.CompletedProcess[str]:
     """on: what is full, or ascii: the encoding of both."""
     with Path("/dev/full").open("w") as full:
@@ -105,14 +105,7 @@ def test_a_recorder_records_on(segment: str, tmp_path: Path, on: str) -> None:
 
 @pytest.mark.usefixtures("robot")
 def test_a_reader_that_has_enough_ends_it_quietly(segment: str) -> None:
-    with subprocess.Popen(
-        [PROGRAM, "echo", segment, "--every"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as echo:
-        assert echo.stdout is not None
-        assert echo.stderr is not None
+    with Running(O80, "echo", segment, "--every") as echo:
         echo.stdout.readline()
         echo.stdout.close()
         said = echo.stderr.read()

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from enum import IntEnum
 
 import pytest
-from processes import O80, WAIT, run_o80
+from processes import O80, WAIT, Running, run_o80
 
 import o80
 
@@ -103,29 +103,19 @@ def test_a_missing_segment_is_said_at_once(segment: str) -> None:
 
 
 def test_it_waits_for_a_robot_if_told_so(segment: str) -> None:
-    waiting = subprocess.Popen(
-        [O80, "echo", segment, "--wait", "--count", "1", "--json"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert waiting.stderr is not None
-    assert "waiting; Ctrl-C ends it" in waiting.stderr.readline()
-    with o80.Backend(segment, actuators=1) as backend:
-        backend.publish([0.25])
-        printed, _ = waiting.communicate(timeout=WAIT)
+    with Running(O80, "echo", segment, "--wait", "--count", "1", "--json") as waiting:
+        assert "waiting; Ctrl-C ends it" in waiting.stderr.readline()
+        with o80.Backend(segment, actuators=1) as backend:
+            backend.publish([0.25])
+            printed, _ = waiting.communicate(timeout=WAIT)
     assert json.loads(printed)["observed"] == [0.25]
 
 
 def test_echo_says_that_a_backend_waits_for_a_burst(segment: str) -> None:
-    with o80.robots.load("two_joints").inline(segment) as frontend:
-        watching = subprocess.Popen(
-            [O80, "echo", segment, "--count", "2"],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        assert watching.stderr is not None
+    with (
+        o80.robots.load("two_joints").inline(segment) as frontend,
+        Running(O80, "echo", segment, "--count", "2") as watching,
+    ):
         said = watching.stderr.readline() + watching.stderr.readline()
         assert "at row 0, waits for a frontend to request iterations" in said
         frontend.burst(1)
@@ -204,9 +194,7 @@ def test_commands_that_come_later_are_shown_when_they_come(
     segment: str, backend: o80.Backend
 ) -> None:
     with (
-        subprocess.Popen(
-            [O80, "echo", segment, "--commands", "--count", "1"], stdout=subprocess.PIPE, text=True
-        ) as echoing,
+        Running(O80, "echo", segment, "--commands", "--count", "1") as echoing,
         o80.Frontend(segment) as frontend,
     ):
         frontend.add_command("elbow", -0.5, duration=0.5)

@@ -2,19 +2,13 @@
 
 import json
 import signal
-import subprocess
 from pathlib import Path
 
 import pytest
-from processes import O80, WAIT, run_o80
+from processes import O80, WAIT, Running, o80_says
 
 import o80
 from o80.recording.scan import scan
-
-
-def run(*words: str | Path, code: int = 0) -> str:
-    done = run_o80(*words, code=code)
-    return done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -22,8 +16,7 @@ def test_an_interrupt_finishes_the_file(
     number: signal.Signals, process: o80.robots.Process, tmp_path: Path
 ) -> None:
     path = tmp_path / "run.mcap"
-    command = [O80, "record", process.segment, "-o", str(path)]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as recorder:
+    with Running(O80, "record", process.segment, "-o", path) as recorder:
         while not path.exists() or not scan_or_none(path):
             assert recorder.poll() is None
         recorder.send_signal(number)
@@ -44,8 +37,8 @@ def scan_or_none(path: Path) -> bool:
 
 
 def test_seconds_and_size_end_it(process: o80.robots.Process, tmp_path: Path) -> None:
-    run("record", process.segment, "-o", tmp_path / "a.mcap", "--seconds", "0.2")
-    run("record", process.segment, "-o", tmp_path / "b.mcap", "--size", "3k")
+    o80_says("record", process.segment, "-o", tmp_path / "a.mcap", "--seconds", "0.2")
+    o80_says("record", process.segment, "-o", tmp_path / "b.mcap", "--size", "3k")
 
     for name in ("a", "b"):
         assert o80.open(tmp_path / f"{name}.mcap")[process.segment].epochs[0].rows > 0
@@ -54,7 +47,7 @@ def test_seconds_and_size_end_it(process: o80.robots.Process, tmp_path: Path) ->
 
 def recorded(segment: str, path: Path, *words: str) -> str:
     """First line of `o80 record` about one segment."""
-    said = run("record", segment, "-o", path, "--seconds", "0.1", *words)
+    said = o80_says("record", segment, "-o", path, "--seconds", "0.1", *words)
     return next(line for line in said.splitlines() if f"'{segment}' " in line)
 
 
@@ -113,13 +106,13 @@ def test_a_recorder_that_continues_says_where_it_goes_on(arm: o80.Frontend, tmp_
     ],
 )
 def test_wrong_options_are_named(words: list[str], said: str, code: int, tmp_path: Path) -> None:
-    printed = run("record", "arm", "-o", tmp_path / "a.mcap", *words, code=code)
+    printed = o80_says("record", "arm", "-o", tmp_path / "a.mcap", *words, code=code)
     assert said in " ".join(printed.split())
     assert not (tmp_path / "a.mcap").exists()
 
 
 def test_a_segment_that_is_not_there_is_waited_for_and_said(tmp_path: Path) -> None:
-    said = run("record", "nobody", "-o", tmp_path / "a.mcap", "--seconds", "0.7")
+    said = o80_says("record", "nobody", "-o", tmp_path / "a.mcap", "--seconds", "0.7")
 
     assert "waiting for segment 'nobody'" in said
     assert "0 rows" in said
@@ -136,7 +129,7 @@ def test_info_describes_a_recording(tmp_path: Path) -> None:
             recording.mark("episode", gain=gain, targets=[0.25] * 40)
             arm.burst(100)
 
-    said = run("info", path)
+    said = o80_says("info", path)
     assert f"{path}: 1 segment, " in said
     assert said.count("two_joints  20") == 3  # a row of the table for each run, with its date
     assert "arm, runs 0, 1: started with" in said
@@ -147,5 +140,5 @@ def test_info_describes_a_recording(tmp_path: Path) -> None:
         ["episode", f"gain={gain},"] for gain in (13.0, 13.0, 15.0)
     ]
     assert all(mark.endswith("...") for mark in marks)  # that a value goes on is said
-    told = json.loads(run("info", path, "--json"))
+    told = json.loads(o80_says("info", path, "--json"))
     assert [each["rows"] for each in told] == [each.rows for each in o80.open(path)["arm"].epochs]

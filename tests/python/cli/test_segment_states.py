@@ -5,14 +5,13 @@ import json
 import os
 import pwd
 import signal
-import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
-from processes import WAIT
+from processes import WAIT, Running
 
 NOBODY = 65534
 BECOME = """
@@ -51,17 +50,12 @@ if user := int(sys.argv.pop(1)):
     os.setuid(user)
     ctypes.CDLL(None).prctl(4, 1)  # PR_SET_DUMPABLE: otherwise root owns its /proc/self
 """
-COMMANDS = (
-    BECOME
-    + """
+COMMANDS = """
 for line in sys.stdin:
     words, environment = json.loads(line)
     print(json.dumps(say(words, **environment) if words else viewed()), flush=True)
 """
-)
-SERVE = (
-    BECOME
-    + """
+SERVE = """
 with o80.Backend("arm", 1, bursting=True, permission=int(sys.argv[1], 8)) as backend:
     backend.publish([0.0])
     print("ready", flush=True)
@@ -70,7 +64,6 @@ if "stay" in sys.argv:
     print("ended", flush=True)
     sys.stdin.read()
 """
-)
 
 
 class Machine:
@@ -84,21 +77,14 @@ class Machine:
         }  # fmt: skip
         self.process = self.started(COMMANDS)
 
-    def started(self, program: str, *words: str) -> "subprocess.Popen[str]":
-        return subprocess.Popen(
-            [sys.executable, "-c", program, self.user, *words],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env=self.environment,
-        )
+    def started(self, program: str, *words: str) -> Running:
+        words = (BECOME + program, self.user, *words)
+        return Running(sys.executable, "-c", *words, env=self.environment)
 
     def close(self) -> None:
         self.process.communicate(timeout=WAIT)
 
     def ask(self, words: Sequence[str], **environment: str) -> Any:
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
         self.process.stdin.write(json.dumps([words, environment]) + "\n")
         self.process.stdin.flush()
         return json.loads(self.process.stdout.readline())
@@ -122,10 +108,9 @@ class Machine:
         known = "running" if state == "hangs" else state  # rows are not read for a list of names
         assert f"arm ({known})" in self.o80("info", "leg", fails=True)
 
-    def backend(self, permission: str = "600", *words: str) -> "subprocess.Popen[str]":
+    def backend(self, permission: str = "600", *words: str) -> Running:
         """A process with a backend."""
         process = self.started(SERVE, permission, *words)
-        assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
         return process
 
@@ -164,14 +149,8 @@ def nobody(directory: Path) -> Iterator[Machine]:
         yield machine
 
 
-def end(process: "subprocess.Popen[str]") -> None:
-    process.kill()
-    process.communicate()
-
-
 def test_a_process_that_is_stopped_hangs_until_it_is_continued(folder: Path, here: Machine) -> None:
-    process = here.backend()
-    try:
+    with here.backend() as process:
         here.expect("running")
         process.send_signal(signal.SIGSTOP)
         os.waitid(os.P_PID, process.pid, os.WSTOPPED)
@@ -186,25 +165,18 @@ def test_a_process_that_is_stopped_hangs_until_it_is_continued(folder: Path, her
         assert "kill -9" not in said
         process.send_signal(signal.SIGCONT)
         process.wait(timeout=WAIT)
-    finally:
-        end(process)
 
 
 def test_a_backend_that_has_ended_in_order_leaves_nothing(folder: Path, here: Machine) -> None:
-    process = here.backend("600", "stay")
-    try:
-        process.stdin.close()  # type: ignore[union-attr]
-        assert process.stdout.readline() == "ended\n"  # type: ignore[union-attr]
+    with here.backend("600", "stay") as process:
+        process.stdin.close()
+        assert process.stdout.readline() == "ended\n"
         assert here.o80("list", "--json") == "[]"
         assert "Nothing runs" in here.o80("list")
         assert "no backend 'arm' runs; nothing runs" in here.o80("stop", "arm", fails=True)
         assert "Nothing to remove." in here.o80("clean")
         assert "there is no segment 'arm'" in here.o80("clean", "arm", fails=True)
         assert "no segment has that name" in here.o80("info", "arm", fails=True)
-    finally:
-        process.kill()
-        process.wait()
-        process.stdout.close()  # type: ignore[union-attr]
 
 
 def test_a_failed_backend_is_failed_everywhere(folder: Path, here: Machine) -> None:
@@ -245,19 +217,17 @@ def expect_unknown(here: Machine) -> None:
 def test_of_a_damaged_segment_nothing_is_said_that_was_not_seen(
     folder: Path, here: Machine, offset: int, size: int
 ) -> None:
-    process = here.backend()
-    try:
+    with here.backend() as process:
         damaged(folder, offset, size)
         expect_unknown(here)
         assert "1 unknown: not removed" in here.o80("clean")
         assert process.poll() is None
-    finally:
-        end(process)
 
 
 @pytest.mark.parametrize("size", [100, 0])
 def test_so_it_is_of_one_that_was_cut(folder: Path, here: Machine, size: int) -> None:
-    end(here.backend())
+    with here.backend():
+        pass
     os.truncate(folder / "o80-arm", size)
     expect_unknown(here)
 
@@ -266,8 +236,7 @@ def test_so_it_is_of_one_that_was_cut(folder: Path, here: Machine, size: int) ->
 def test_a_user_sees_of_a_segment_of_root_what_its_permission_says(
     folder: Path, here: Machine, nobody: Machine, permission: str
 ) -> None:
-    process = here.backend(permission)
-    try:
+    with here.backend(permission):
         here.expect("running")
         if permission == "600":
             assert nobody.state() == "unknown"
@@ -289,8 +258,6 @@ def test_a_user_sees_of_a_segment_of_root_what_its_permission_says(
         if permission == "644":
             said = nobody.o80("halt", "arm", fails=True)
             assert "cannot be commanded by this user" in said
-    finally:
-        end(process)
     here.expect("killed")
     if permission == "600":
         assert nobody.state() == "unknown"
@@ -306,8 +273,7 @@ def test_root_believes_a_segment_of_a_user_only_if_it_is_told_to(
     folder: Path, here: Machine, nobody: Machine
 ) -> None:
     user = pwd.getpwuid(NOBODY).pw_name
-    process = nobody.backend()
-    try:
+    with nobody.backend() as process:
         nobody.expect("running")
         assert here.state() == "unknown"
         untrusted = f"belongs to user {user}, whom this user does not trust"
@@ -320,20 +286,15 @@ def test_root_believes_a_segment_of_a_user_only_if_it_is_told_to(
         assert "arm, running, rows" in here.o80("info", "arm", O80_TRUST=user)
         assert "arm has stopped" in here.o80("stop", "arm", O80_TRUST=user)
         process.wait(timeout=WAIT)
-    finally:
-        end(process)
 
 
 def test_the_view_says_what_it_has_not_seen(folder: Path, here: Machine, nobody: Machine) -> None:
-    process = here.backend()
-    try:
+    with here.backend():
         (shown, _) = nobody.ask([])
         assert (shown["name"], shown["state"]) == ("arm", "unknown")
         assert "cannot be opened" in shown["problem"]
         (shown, _) = here.ask([])
         assert shown["state"] == "running"
-    finally:
-        end(process)
     (shown, _) = here.ask([])
     assert shown["state"] == "killed"
 
@@ -341,13 +302,12 @@ def test_the_view_says_what_it_has_not_seen(folder: Path, here: Machine, nobody:
 def test_of_a_directory_that_cannot_be_read_nobody_says_that_nothing_runs(
     folder: Path, here: Machine, nobody: Machine
 ) -> None:
-    process = here.backend()
-    folder.chmod(0o700)
-    try:
-        for words in (["list"], ["stop", "arm"], ["stop", "--all"], ["clean"]):
-            assert f"{folder} cannot be read" in nobody.o80(*words, fails=True), words
-        (waiting,) = nobody.ask([])
-        assert f"{folder} cannot be read" in waiting
-    finally:
-        folder.chmod(0o1777)
-        end(process)
+    with here.backend():
+        folder.chmod(0o700)
+        try:
+            for words in (["list"], ["stop", "arm"], ["stop", "--all"], ["clean"]):
+                assert f"{folder} cannot be read" in nobody.o80(*words, fails=True), words
+            (waiting,) = nobody.ask([])
+            assert f"{folder} cannot be read" in waiting
+        finally:
+            folder.chmod(0o1777)

@@ -10,6 +10,7 @@ import pandas
 import pyarrow.parquet
 import pytest
 from processes import run_o80
+from room_sensor import Obedient
 
 import o80
 from o80.datasets import lerobot, minari
@@ -270,21 +271,10 @@ def test_a_lerobot_data_set_has_the_documented_files(recorded: Path, tmp_path: P
     assert parquet.num_row_groups == 3
 
 
-class Slow:
-    """A joint that needs 100 iterations for a radian, and is where it was asked to be."""
+class Slow(Obedient):
+    """A joint that needs 100 iterations for a radian."""
 
-    actuators = ("elbow",)
     limits: ClassVar = {"elbow": o80.Limits(minimum=-2, maximum=2, speed=10.0)}
-    simulated = True
-
-    def __init__(self) -> None:
-        self.place = 0.0
-
-    def write(self, desired: Any) -> None:
-        self.place = desired.states[0]
-
-    def read(self, reading: Any) -> None:
-        reading.observed = [self.place]
 
 
 def test_a_data_set_has_what_was_asked_for_and_what_acted(segment: str, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Texts of `o80 list` and `o80 info` about robots whose driver hangs or is late."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -9,7 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from processes import O80, WAIT, run_o80
+from processes import O80, WAIT, Running, run_o80, until
 
 import o80
 
@@ -69,45 +70,29 @@ def compiled(folder: Path, name: str, driver: str) -> Path:
     return folder / f"{name}.so"
 
 
-def line_with(text: str, process: "subprocess.Popen[bytes]") -> str:
+def line_with(text: str, process: Running) -> str:
     """The first line with this text that the process prints on its standard error."""
-    assert process.stderr is not None
     for line in process.stderr:
-        if text in line.decode():
-            return line.decode()
+        if text in line:
+            return line
     raise AssertionError(f"it ended without a line with '{text}'")
 
 
-Hang = Callable[[str], "subprocess.Popen[bytes]"]
+Hang = Callable[[str], Running]
 
 
 @pytest.fixture
 def hang(library: Path, segment: str) -> Iterator[Hang]:
     """Starts a robot that hangs in a verb."""
-    started: list[subprocess.Popen[bytes]] = []
-
-    def start(verb: str) -> "subprocess.Popen[bytes]":
-        command = [O80, "run", str(library), "--segment", segment, "--verb", verb]
-        started.append(subprocess.Popen(command, stderr=subprocess.PIPE))
-        return started[-1]
-
-    yield start
-    for process in started:
-        process.kill()
-        process.wait()
-        assert process.stderr is not None
-        process.stderr.close()
+    command = [O80, "run", library, "--segment", segment, "--verb"]
+    with contextlib.ExitStack() as started:
+        yield lambda verb: started.enter_context(Running(*command, verb))
     o80.clean(segment)
 
 
 def until_said(text: str, *command: str) -> str:
     """Asks again and again until the answer has the text."""
-    end = time.monotonic() + WAIT
-    answer = ""
-    while text not in answer:
-        assert time.monotonic() < end, answer
-        answer = run_o80(*command, code=None).stdout
-    return answer
+    return until(lambda: said if text in (said := run_o80(*command, code=None).stdout) else "")
 
 
 def test_a_start_that_does_not_return_is_listed(segment: str, hang: Hang) -> None:

@@ -1,8 +1,8 @@
 """The typed module of a robot: type checkers accept its names and refuse others."""
 
 import ast
-import importlib.util
 import os
+import runpy
 from enum import IntEnum
 from pathlib import Path
 from typing import Any
@@ -144,13 +144,8 @@ def test_a_type_checker_accepts_names_of_the_robot_and_refuses_others(folder: Pa
     assert "my_" not in said.replace("my_crane.", "").replace("my_camera.", ""), said
 
 
-def imported(path: Path) -> Any:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def attach_of(path: Path) -> Any:
+    return runpy.run_path(str(path))["attach"]
 
 
 @ROBOTS
@@ -163,16 +158,16 @@ def test_the_module_of_any_robot_attaches_to_it(
     with o80.Backend(name, groups, extended=sensors, requests={"go": {"to": Gear}}) as backend:
         backend.publish()
         file.write_text(module_of(backend.schema, name))
-        with imported(file).attach(read_only=True) as frontend:
+        with attach_of(file)(read_only=True) as frontend:
             assert frontend.segment == name
 
 
 def test_a_module_refuses_another_robot(folder: Path, segment: str) -> None:
-    module = imported(folder / "my_crane.py")
+    attach = attach_of(folder / "my_crane.py")
     with o80.Backend(segment, ["left"]) as backend:
         backend.publish()
         with pytest.raises(o80.SchemaMismatch, match=f"make it again with `o80 stub {segment}`"):
-            module.attach(segment)
+            attach(segment)
 
 
 def test_units_do_not_make_it_another_robot_and_types_do(segment: str) -> None:
@@ -199,7 +194,7 @@ def test_the_command_writes_the_module_of_a_robot_or_a_segment(
     run_o80("stub", arm.segment, "-o", tmp_path / "mine.py")
 
     assert "Literal['shoulder', 'elbow']" in printed
-    with imported(tmp_path / "mine.py").attach() as frontend:
+    with attach_of(tmp_path / "mine.py")() as frontend:
         assert frontend.segment == arm.segment
         frontend.add_command("elbow", np.float64(0.1))
         frontend.forget_added()

@@ -8,18 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from processes import O80, WAIT
+from processes import O80, PRODUCT, WAIT, Running
 
 import o80
 
-ROOT = Path(__file__).resolve().parents[3]
-PACKAGES = (
-    "python/o80",
-    "devices/o80_devices",
-    "gateways/ros2/o80_ros2",
-    "robots/arms/python",
-    "apps/table_tennis/o80_table_tennis",
-)
 SUBSETS = [(0,), (1,), (2,), (0, 1, 2)]
 
 closed_subsets = pytest.mark.parametrize(
@@ -27,13 +19,11 @@ closed_subsets = pytest.mark.parametrize(
 )
 
 
-def started(closed: tuple[int, ...], *words: object) -> "subprocess.Popen[bytes]":
+def started(closed: tuple[int, ...], *words: object) -> Running:
     """A program whose descriptors of these numbers are closed."""
     closing = " ".join(f"{number}>&-" for number in closed)
-    command = ["bash", "-c", f'exec "$@" {closing}', "bash", *map(str, words)]
-    return subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
+    none = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+    return Running("bash", "-c", f'exec "$@" {closing}', "bash", *words, **none)
 
 
 def run(closed: tuple[int, ...], *words: object) -> None:
@@ -44,8 +34,8 @@ def run(closed: tuple[int, ...], *words: object) -> None:
 def test_a_robot_is_recorded_halted_resumed_and_stopped(
     closed: tuple[int, ...], segment: str, tmp_path: Path
 ) -> None:
-    robot = started(closed, O80, "run", "two_joints", "--segment", segment, "--frequency", 100)
-    try:
+    words = ["run", "two_joints", "--segment", segment, "--frequency", 100]
+    with started(closed, O80, *words) as robot:
         with o80.Frontend(segment, timeout=WAIT) as arm:
             recording = tmp_path / "run.mcap"
             recorder = started(closed, O80, "record", segment, "-o", recording)
@@ -64,8 +54,6 @@ def test_a_robot_is_recorded_halted_resumed_and_stopped(
             run(closed, "stop", segment)
         assert robot.wait(WAIT) == 0
         assert len(o80.open(recording)[segment].epochs[0].history()) > 20
-    finally:
-        robot.kill()
 
 
 HOST = """
@@ -137,7 +125,7 @@ def unguarded(file: Path) -> list[str]:
         if any(ast.unparse(guard) == "above_standard()" for guard in guards):
             guarded.update(ast.walk(node))
     return [
-        f"{file.relative_to(ROOT)}:{node.lineno}"
+        f"{file}:{node.lineno}"
         for node in ast.walk(tree)
         if isinstance(node, ast.Call)
         and node not in guarded
@@ -146,20 +134,14 @@ def unguarded(file: Path) -> list[str]:
 
 
 def test_what_stays_open_is_opened_above_the_standard_descriptors() -> None:
-    files = [
-        file
-        for package in PACKAGES
-        for file in (ROOT / package).rglob("*.py")
-        if not any(part in str(file) for part in MOMENTS | PROGRAMS)
-    ]
+    files = [file for file in PRODUCT if not any(part in str(file) for part in MOMENTS | PROGRAMS)]
     assert not [call for file in files for call in unguarded(file)]
 
 
 def test_programs_open_missing_standard_descriptors_first() -> None:
     mains = [
         (file, node)
-        for package in PACKAGES
-        for file in (ROOT / package).rglob("*.py")
+        for file in PRODUCT
         for node in ast.parse(file.read_text()).body
         if isinstance(node, ast.If) and ast.unparse(node.test) == "__name__ == '__main__'"
     ]

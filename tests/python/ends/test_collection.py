@@ -162,8 +162,9 @@ def test_objects_may_be_referred_to_weakly(arm: o80.Frontend) -> None:
     assert weakref.ref(arm)() is arm
 
 
-DROPPED = """
-import gc, sys, o80
+WATCHED = """
+import o80, o80._core
+o80._core._warn_of_leaks()
 with o80.Backend("{name}", ["a"], requests={{"home": None}}) as backend:
     backend.on("home", lambda fields: None)
     backend.publish([0.0])
@@ -175,9 +176,6 @@ with o80.Backend("{name}", ["a"], requests={{"home": None}}) as backend:
 with o80.robots.load("two_joints").inline() as arm:
     burst = arm.burst(3, wait=False)
 """
-
-
-WATCHED = "import o80._core; o80._core._warn_of_leaks()" + DROPPED
 
 
 def test_python_that_watches_itself_finds_no_leak(segment: str) -> None:

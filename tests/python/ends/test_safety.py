@@ -6,23 +6,16 @@ import re
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from processes import O80, WAIT, run_o80, run_program
+from manual_backend import ManualBackend
+from processes import O80, WAIT, Running, run_o80, run_program, until
 
 import o80
 
 ROOT = Path(__file__).resolve().parents[3]
-
-
-def until(true: Callable[[], object]) -> None:
-    end = time.monotonic() + WAIT
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.001)
 
 
 def start(segment: str, **options: object) -> o80.robots.Process:
@@ -57,13 +50,8 @@ def test_signals_stop_in_order(segment: str, number: signal.Signals) -> None:
 
 
 def test_a_robot_whose_output_nobody_reads_lives_on(segment: str) -> None:
-    program = subprocess.Popen(
-        [O80, "run", "two_joints", "--segment", segment],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-    )
-    try:
-        assert program.stdout is not None
+    words = [O80, "run", "two_joints", "--segment", segment]
+    with Running(*words, stderr=subprocess.STDOUT) as program:
         program.stdout.readline()
         program.stdout.close()  # the terminal is gone, nobody was told
         with o80.Frontend(segment, timeout=WAIT) as arm:
@@ -71,27 +59,17 @@ def test_a_robot_whose_output_nobody_reads_lives_on(segment: str) -> None:
             until(lambda: arm.latest().halted)
             until(lambda: arm.published > 3000)  # a line was due
             arm.resume(number)
-    finally:
-        program.terminate()
-        program.wait()
 
 
 def test_a_robot_started_with_nohup_goes_on_when_the_terminal_closes(segment: str) -> None:
-    program = subprocess.Popen(
-        ["nohup", O80, "run", "two_joints", "--segment", segment],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        with o80.Frontend(segment, timeout=WAIT) as arm:
-            program.send_signal(signal.SIGHUP)
-            arm.add_command(0, 0.1, iterations=50)
-            assert arm.pulse_and_wait(timeout=WAIT).desired[0] == 0.1
-            assert arm.halted is None
-    finally:
-        program.terminate()
-        program.wait()
+    with (
+        Running("nohup", O80, "run", "two_joints", "--segment", segment) as program,
+        o80.Frontend(segment, timeout=WAIT) as arm,
+    ):
+        program.send_signal(signal.SIGHUP)
+        arm.add_command(0, 0.1, iterations=50)
+        assert arm.pulse_and_wait(timeout=WAIT).desired[0] == 0.1
+        assert arm.halted is None
 
 
 FULL_DIRECTORY = """
@@ -156,40 +134,28 @@ def test_an_embedded_backend_halts_and_resumes(segment: str) -> None:
         if refuse:
             raise o80.RequestRejected(refuse.pop())
 
-    with (
-        o80.Backend(
-            segment, 2, requests={"see": None, "go": None}, while_halted=["see"]
-        ) as backend,
-    ):
+    requests: dict[str, None] = {"see": None, "go": None}
+    with ManualBackend(segment, 2, requests=requests, while_halted=["see"]) as robot:
+        backend, arm = robot.backend, robot.frontend
         backend.on_halt(lambda: told.append("halt"))
         backend.on_resume(resume)
-        backend.on("see", lambda _: None)
-        backend.on("go", lambda _: None)
-        backend.publish([0.0, 0.0])
-        with o80.Frontend(segment) as arm:
-            backend.halt("from inside")
-            backend.step()
-            backend.publish([0.5, 0.5])
-            halt = arm.halted
-            assert halt is not None
-            assert (halt.cause, halt.text, told) == ("driver", "from inside", ["halt"])
-            for name, status in (("see", "completed"), ("go", "rejected")):
-                arm.add_request(name)
-                batch = arm.pulse()
-                backend.step()
-                backend.publish()
-                assert batch.handles[0].status == status
+        for name in requests:
+            backend.on(name, lambda _: None)
+        backend.halt("from inside")
+        robot.run()
+        halt = arm.halted
+        assert halt is not None
+        assert (halt.cause, halt.text, told) == ("driver", "from inside", ["halt"])
+        for name, status in (("see", "completed"), ("go", "rejected")):
+            arm.add_request(name)
+            batch = arm.pulse()
+            robot.run()
+            assert batch.handles[0].status == status
+        for refused in (True, False):  # by the handler
             with pytest.raises(o80.TimeoutError):
                 arm.resume(timeout=0)
-            backend.step()
-            backend.publish()
-            assert arm.halted is not None, "the handler refused"
-            with pytest.raises(o80.TimeoutError):
-                arm.resume(timeout=0)
-            backend.step()
-            backend.publish()
-            assert arm.halted is None
-            assert arm.latest().desired.tolist() == [0.5, 0.5]  # type: ignore[unreachable]
+            robot.run()
+            assert (arm.halted is not None) == refused
 
 
 @pytest.mark.parametrize("value", [False, "no", 7])
@@ -254,3 +220,54 @@ def test_a_resume_says_whether_there_was_a_halt(arm: o80.Frontend) -> None:
     number = arm.halt()
     assert arm.resume(number) is True
     assert asyncio.run(arm.aio.resume()) is False
+
+
+# ---------------------------------------------------------------------------- stopped by their name
+
+
+def test_a_backend_that_does_not_stop_in_time_is_told_of(segment: str) -> None:
+    program = (
+        "import signal, o80\n"
+        "signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
+        f"backend = o80.Backend({segment!r}, ['a'])\n"
+        "backend.publish([0.0])\n"
+        "print('ready', flush=True)\n"
+        "signal.pause()\n"
+    )
+    with Running(sys.executable, "-c", program) as deaf:
+        assert deaf.stdout.readline() == "ready\n"
+        with pytest.raises(o80.TimeoutError, match=f"kill -9 {deaf.pid}"):
+            o80.stop(segment, timeout=0.0)
+
+
+@pytest.fixture
+def reused(process: o80.robots.Process, segment: str) -> o80.robots.Process:
+    """A robot whose segment bears the process id of another, later process."""
+    file = Path(os.environ["O80_DIRECTORY"], f"o80-{segment}")
+    content = file.read_bytes()
+    entry = next(entry for entry in o80.segments() if entry.name == segment)
+    where = content.index(entry.process_start.to_bytes(8, "little"))
+    with file.open("r+b") as header:
+        header.seek(where)
+        header.write((entry.process_start - 1).to_bytes(8, "little"))
+    return process
+
+
+def test_a_process_that_only_has_the_id_of_the_backend_is_not_signalled(
+    reused: o80.robots.Process, segment: str
+) -> None:
+    with pytest.raises(o80.SegmentError, match=f"process {reused.pid} is not the one"):
+        o80.stop(segment)
+
+    with reused.frontend() as arm:
+        assert arm.wait_for(arm.published + 20, timeout=WAIT)
+    assert reused.alive
+
+
+def test_the_command_line_stops_the_others_when_one_does_not_run(
+    process: o80.robots.Process, segment: str
+) -> None:
+    stopped = run_o80("stop", "arm", segment, code=1)
+    assert "no backend 'arm' runs" in stopped.stderr
+    assert f"{segment} has stopped" in stopped.stdout
+    assert process.wait(WAIT) == 0

@@ -1,6 +1,8 @@
 """Signals in every call that waits."""
 
 import contextlib
+import dis
+import itertools
 import os
 import pty
 import select
@@ -9,20 +11,79 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
+from types import CodeType, FrameType
 from typing import Any
 
 import pytest
-from alarm import alarm_in, handling
 from blocking import CALLS
-from interrupting import at_every_moment
-from processes import WAIT
+from processes import WAIT, Running
 
 import o80
 from o80.base.child_process import start_child
 from o80.recording.locked_file import LockedFile
 from o80.robots.process import Process
+
+
+@cache
+def moments_of(code: CodeType) -> frozenset[int]:
+    """Offsets before which Python checks for signals: after a call, at the begin of a loop.
+
+    Elsewhere an interrupt can cause states that a signal cannot, such as an exception that stays
+    handled.
+    """
+    looked = set()
+    after = False
+    for each in dis.get_instructions(code):
+        if after:
+            looked.add(each.offset)
+        after = each.opname.startswith("CALL") or each.opname == "RESUME"
+        if "JUMP_BACKWARD" in each.opname:
+            looked.add(each.argval)
+    return frozenset(looked)
+
+
+def interrupted(block: Callable[[], object], moment: int) -> BaseException | None:
+    """Calls `block` with an interrupt at this moment; returns the error, None if it ended before.
+
+    Python's modules may raise another exception instead, for example of an unlocked lock.
+    `threading` is left out: between the last instruction of a `with` and its end, where no signal
+    is handled, an interrupt would leave the lock of all threads taken.
+    """
+    left = moment
+
+    def trace(frame: FrameType, event: str, _: object) -> Any:
+        nonlocal left
+        frame.f_trace_opcodes = frame.f_code.co_filename != threading.__file__
+        left -= event == "opcode" and frame.f_lasti in moments_of(frame.f_code)
+        if left == 0:
+            raise KeyboardInterrupt
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        block()
+    except BaseException as error:
+        if left > 0:
+            raise
+        return error
+    finally:
+        sys.settrace(before)
+    return None
+
+
+def at_every_moment(block: Callable[[], object], step: int = 1) -> Iterator[BaseException | None]:
+    """Calls `block` again and again, each time interrupted `step` moments later."""
+    block()  # a first call imports all: an interrupted import would leave its lock taken
+    for moment in itertools.count(1, step):
+        errors = [interrupted(block, moment)]  # a variable would keep the exception
+        if errors[0] is None:
+            return
+        yield errors.pop()
+
 
 PROGRAM = """
 import os, signal, sys, time
@@ -68,15 +129,9 @@ def in_a_wait(process: int) -> bool:
 def test_ctrl_c_ends_every_wait_and_leaves_everything_usable(
     segment: str, tmp_path: Path, record_property: Callable[[str, object], None]
 ) -> None:
-    program = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM.format(name=segment, folder=str(tmp_path))],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
-    )
-    assert program.stdout is not None
-    assert program.stderr is not None
+    text = PROGRAM.format(name=segment, folder=str(tmp_path))
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    program = Running(sys.executable, "-c", text, env=environment)
     watch = threading.Timer(WAIT, program.kill)
     watch.start()
     delays = {}
@@ -98,6 +153,27 @@ def test_ctrl_c_ends_every_wait_and_leaves_everything_usable(
     # a figure for the report, no limit: the machine may be slow
     record_property("longest delay of Ctrl-C [ms]", max(delays.values()))
     assert all(delay < WAIT * 1e3 for delay in delays.values())
+
+
+@contextlib.contextmanager
+def handling(number: int, handler: Callable[..., object]) -> Iterator[None]:
+    """Installs a signal handler for the block."""
+    before = signal.signal(number, handler)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(number, before)
+
+
+@contextlib.contextmanager
+def alarm_in(seconds: float) -> Iterator[None]:
+    """Sends SIGALRM during the block; on a slow machine before its first call."""
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
 
 
 def test_a_handler_that_returns_lets_the_wait_go_on_with_its_timeout(arm: o80.Frontend) -> None:
@@ -210,13 +286,7 @@ with o80.robots.load("two_joints").start({name!r}) as process, process.frontend(
 
 
 def test_ctrl_c_twice_ends_a_program_whose_robot_does_not_stop(segment: str) -> None:
-    program = subprocess.Popen(
-        [sys.executable, "-c", TWICE.format(name=segment)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert program.stdout is not None
+    program = Running(sys.executable, "-c", TWICE.format(name=segment))
     robot = int(program.stdout.readline())
     program.send_signal(signal.SIGINT)
     assert program.stdout.readline() == "once\n"

@@ -1,6 +1,5 @@
 """Many threads of one process, each in a call that waits."""
 
-import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -9,7 +8,7 @@ from typing import Any
 
 import pytest
 from blocking import CALLS, Place, place, waiting_methods
-from processes import WAIT, run_python
+from processes import WAIT, Running, run_python
 
 import o80
 
@@ -190,14 +189,7 @@ ENDS = {
 @pytest.mark.parametrize("error", ENDS)
 def test_the_end_of_a_backend_ends_every_wait_of_sixteen_threads(segment: str, error: str) -> None:
     sources = [call.source for call in CALLS.values() if call.closing.startswith(("sil", "sta"))]
-    with subprocess.Popen(
-        [sys.executable, "-c", BACKENDS.format(name=segment)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as program:
-        assert program.stdout is not None
-        assert program.stdin is not None
+    with Running(sys.executable, "-c", BACKENDS.format(name=segment)) as program:
         assert program.stdout.readline() == "ready\n"
         threads = []
         opened = []
@@ -221,6 +213,7 @@ def test_the_end_of_a_backend_ends_every_wait_of_sixteen_threads(segment: str, e
         assert type(raised).__name__ == error, f"{thread.source}: {raised!r}"
         assert segment in str(raised)
     for frontend in opened:
+        assert f"Backend{frontend.life.title()}" == error
         frontend.forget_added()
         frontend.close()
     for suffix in ("silent", "standing"):

@@ -9,6 +9,7 @@ from manual_backend import ManualBackend
 import o80
 
 JOINT = {"position": float, "velocity": float}
+PLACE = o80.IntegralBounds("position")
 
 
 NUMBERS = ("minimum", "maximum", "speed", "acceleration", "jerk", "error", "noise")
@@ -81,28 +82,14 @@ def test_bounds_of_an_integral_reach_the_frontend(segment: str) -> None:
         ({"integral": o80.IntegralBounds("velocity")}, "another field"),
         ({"integral": o80.IntegralBounds("position", 1.0, -1.0)}, "must not exceed the maximum"),
         ({"integral": o80.IntegralBounds("position", reaction=-0.1)}, "reaction"),
-        (
-            {
-                "speed": 1.0,
-                "acceleration": 1.0,
-                "jerk": 1.0,
-                "integral": o80.IntegralBounds("position"),
-            },
-            "no limit of jerk",
-        ),
-        ({"minimum": 0.5, "integral": o80.IntegralBounds("position")}, "rest at 0"),
+        ({"speed": 1.0, "acceleration": 1.0, "jerk": 1.0, "integral": PLACE}, "no limit of jerk"),
+        ({"minimum": 0.5, "integral": PLACE}, "rest at 0"),
     ],
 )
 def test_bounds_of_an_integral_that_cannot_be_are_refused(
     segment: str, velocity: dict[str, Any], said: str
 ) -> None:
     rests = {} if "minimum" in velocity else {"joint": {"velocity": 0.0}}
+    limits = {"joint": {"velocity": o80.Limits(**velocity)}}
     with pytest.raises(o80.InvalidArgument, match=said):
-        o80.Backend(
-            segment,
-            ["joint"],
-            JOINT,
-            frequency=1000.0,
-            limits={"joint": {"velocity": o80.Limits(**velocity)}},
-            rests_at=rests,
-        )
+        o80.Backend(segment, ["joint"], JOINT, limits=limits, rests_at=rests)

@@ -3,67 +3,54 @@
 import asyncio
 import math
 import pickle
-import threading
 from collections.abc import Iterator
+from typing import Any
 
+import numpy as np
 import pytest
 from processes import WAIT
 
 import o80
 
-STATE = {"position": float, "velocity": float, "held": bool}
-UNITS = {"position": "rad", "velocity": "rad/s"}
-
 
 class Plant:
-    """A bursting robot, stepped by a thread: observed follows desired by half the way each time."""
+    """Observed follows desired by half the way each time."""
 
-    def __init__(self, segment: str) -> None:
-        self.stuck = False
-        self.backend = o80.Backend(
-            segment, {"joints": (STATE, 2)}, units=UNITS, bursting=True, frequency=1000.0
-        )
-        self.backend.publish({"joints": [(0.0, 0.0, False)] * 2})
-        self._thread = threading.Thread(target=self._run)
-        self._thread.start()
+    actuators = ("joints_0", "joints_1")
+    dtype = {"position": float, "velocity": float, "held": bool}  # noqa: RUF012
+    units = {"position": "rad", "velocity": "rad/s"}  # noqa: RUF012
+    simulated = True
+    share = 0.5
 
-    def _run(self) -> None:
-        places = [0.0, 0.0]
-        while (desired := self.backend.step()) is not None:
-            joints = desired.joints
-            if not self.stuck:
-                places = [
-                    place + 0.5 * (float(goal) - place)
-                    for place, goal in zip(places, joints["position"], strict=True)
-                ]
-            held = [bool(each) for each in joints["held"]]
-            self.backend.publish({"joints": [(places[0], 7.0, held[0]), (places[1], 7.0, held[1])]})
+    def __init__(self) -> None:
+        self.places = np.zeros(2)
 
-    def close(self) -> None:
-        self.backend.stop()
-        self._thread.join(WAIT)
-        self.backend.close()
+    def write(self, desired: Any) -> None:
+        self.places += self.share * (desired["position"] - self.places)
+
+    def read(self, reading: Any) -> None:
+        reading.observed = [(place, 7.0, False) for place in self.places]
+
+
+class Stuck(Plant):
+    """Observed stays."""
+
+    share = 0.0
 
 
 @pytest.fixture
-def plant(segment: str) -> Iterator[Plant]:
-    made = Plant(segment)
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def joints(plant: Plant, segment: str) -> Iterator[o80.Frontend]:
-    with o80.Frontend(segment) as frontend:
+def joints(segment: str) -> Iterator[o80.Frontend]:
+    with o80.robots.load(Plant).inline(segment) as frontend:
         yield frontend
 
 
-def test_says_where_the_robot_is(plant: Plant, joints: o80.Frontend) -> None:
-    plant.stuck = True
-    with pytest.raises(o80.NotReached) as raised:
-        joints.move_to(
-            ["joints_0", "joints_1"], [0.5, {"position": 0.005}], tolerance=0.01, timeout=0.02
-        )
+def test_says_where_the_robot_is(segment: str) -> None:
+    named, targets = ["joints_0", "joints_1"], [0.5, {"position": 0.005}]
+    with (
+        o80.robots.load(Stuck).inline(segment) as joints,
+        pytest.raises(o80.NotReached) as raised,
+    ):
+        joints.move_to(named, targets, tolerance=0.01, timeout=0.02)
 
     error = raised.value
     (miss,) = error.misses

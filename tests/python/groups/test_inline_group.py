@@ -27,21 +27,6 @@ def files() -> list[str]:
     return [file.name for file in folder.glob("o80-*")]
 
 
-@pytest.mark.parametrize("each", [1, 3])
-def test_sends_each_copy_its_targets_and_returns_its_rows(
-    group: o80.InlineGroup, each: int
-) -> None:
-    burst = group.prepared_burst(6, steps=2, each=each)
-    burst.targets = np.random.default_rng(3).uniform(-2, 2, (COPIES, 2, 2))
-    burst.run()
-    for i in range(COPIES):
-        with o80.robots.load("two_joints").inline() as single:
-            one = single.prepared_burst(6, steps=2, each=each)
-            one.targets = burst.targets[i]
-            one.run()
-            assert burst.rows[i].tobytes() == one.rows.tobytes()
-
-
 def test_a_burst_is_followed_by_one_whose_targets_are_its_rows(group: o80.InlineGroup) -> None:
     with o80.robots.load("two_joints").inline(copies=COPIES, threads=group) as mirror:
         assert mirror.threads == group.threads == 2
@@ -321,7 +306,7 @@ def test_a_group_that_is_never_closed_is_warned_about_and_stopped() -> None:
 CTRL_C = """
 import os, signal, sys, threading, time
 import o80
-group = o80.robots.load("two_joints").inline(copies=4, threads=2)
+group = o80.robots.load("two_joints").inline(copies=4, threads=4)
 burst = group.prepared_burst(30)
 burst.targets[...] = 0.5
 for _ in range(10):
@@ -343,8 +328,7 @@ except KeyboardInterrupt:
 
 
 def test_ctrl_c_ends_a_call_between_two_iterations() -> None:
-    program = CTRL_C.replace("copies=4, threads=2", "copies=4, threads=4")
-    ended = run_python("-W", "ignore", "-c", program, code=None)
+    ended = run_python("-W", "ignore", "-c", CTRL_C, code=None)
     assert ended.stdout == "interrupted\n", ended.stderr
 
 

@@ -12,32 +12,22 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from room_sensor import Obedient
 
 import o80
 from o80.cli.teleop import _Session
 from o80.datasets.episodes import episodes_of
-from o80.drivers import Desired, Reading
 
 SECOND = 1000  # iterations
 
 
-class Arm:
-    """Is where it is told to be; the one that a test moves stands for a hand."""
+class Arm(Obedient):
+    """The one that a test moves stands for a hand."""
 
     actuators = ("wrist", "elbow", "lamp")
-    simulated = True
-
-    def __init__(self) -> None:
-        self.places = np.zeros(3)
-
-    def write(self, desired: Desired) -> None:
-        self.places = np.array(desired.states)
-
-    def read(self, reading: Reading) -> None:
-        reading.observed = self.places
 
 
-class Follower(Arm):
+class Follower(Obedient):
     """With limits, and joints of another order."""
 
     actuators = ("elbow", "gripper", "wrist")

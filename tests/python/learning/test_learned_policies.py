@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,12 +12,23 @@ import numpy as np
 import pytest
 import training_tasks
 from gymnasium.spaces import Box
+from hypothesis import given
+from hypothesis import strategies as st
+from processes import run_python
 from training_tasks import Guess, Near, OfItsOwn
 
 import o80
 from o80.learning.rollouts import GaussianPolicy
 from o80.learning.rollouts.rollout import Ends
-from o80.learning.training import CurvePoint, LearnedPolicy, NamedTask, curve, evaluate, make_vec
+from o80.learning.training import (
+    CurvePoint,
+    LearnedPolicy,
+    NamedTask,
+    curve,
+    evaluate,
+    make_vec,
+    wilson,
+)
 from o80.learning.training.curve import LAST, EpisodeWindow, success_share
 
 
@@ -88,7 +97,7 @@ def test_playing_a_policy_loads_no_learning_library() -> None:
     code = (
         "import sys, o80.learning.training\nassert not {'torch', 'matplotlib'} & set(sys.modules)"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
+    run_python("-c", code)
 
 
 def test_every_policy_plays_the_same_episodes_whatever_the_number_of_copies() -> None:
@@ -154,3 +163,26 @@ def test_a_curve_is_read_as_it_was_written_cut_and_drawn(tmp_path: Path) -> None
     path.write_text("something,else\n")
     with pytest.raises(o80.InvalidArgument, match="not a learning curve"):
         curve.points(path, CurvePoint)
+
+
+@pytest.mark.parametrize(
+    ("successes", "count", "low", "high"),
+    # Brown, Cai, DasGupta (2001) and R's binom.confint(method="wilson")
+    [(0, 10, 0.0, 0.27753), (5, 10, 0.23659, 0.76341), (10, 10, 0.72247, 1.0), (0, 0, 0.0, 1.0)],
+)
+def test_known_intervals(successes: int, count: int, low: float, high: float) -> None:
+    assert wilson(successes, count) == pytest.approx((low, high), abs=1e-5)
+
+
+@given(count=st.integers(1, 10**6), share=st.floats(0, 1))
+def test_it_holds_the_share_and_narrows_with_the_count(count: int, share: float) -> None:
+    successes = round(share * count)
+    low, high = wilson(successes, count)
+    assert 0 <= low <= successes / count <= high <= 1
+    many_low, many_high = wilson(4 * successes, 4 * count)
+    assert many_high - many_low < high - low
+
+
+def test_more_than_all_is_refused() -> None:
+    with pytest.raises(ValueError, match="between 0 and 3, got 4"):
+        wilson(4, 3)

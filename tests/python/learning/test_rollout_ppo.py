@@ -1,21 +1,21 @@
 """Stable-Baselines3's PPO learns from the rollouts of a collector (o80.learning.rollouts.ppo)."""
 
 import tempfile
+from collections.abc import Iterator
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
 import torch
-from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from rollout_ppo import copied, model_of
 from rollout_tasks import COPIES, INFOS, maker
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecNormalize
+from training_tasks import Guess
 
 import o80
 from o80.learning.rollouts import Collector, Rollout
@@ -24,6 +24,41 @@ from o80.learning.rollouts.ppo import CollectorEnv, RolloutPPO
 pytestmark = pytest.mark.check  # needs torch, which only `make check` installs
 
 STEPS = 32
+
+
+def model_of(collector: Collector, *, steps: int, batch: int = 80) -> RolloutPPO:
+    return RolloutPPO(
+        "MlpPolicy",
+        VecNormalize(CollectorEnv(collector), norm_reward=False),
+        n_steps=steps,
+        batch_size=batch,
+        n_epochs=4,
+        learning_rate=2e-3,
+        seed=3,
+        device="cpu",
+    )
+
+
+class Copied:
+    """A model as it was before its last update."""
+
+    def __init__(self, model: PPO) -> None:
+        self.gamma, self.trace = model.gamma, model.gae_lambda
+        self._policy, self._weights = model.policy, deepcopy(model.policy.state_dict())
+        normalisation = model.get_vec_normalize_env()
+        assert normalisation is not None
+        self._statistics: Any = deepcopy(normalisation.obs_rms)
+        self._epsilon = normalisation.epsilon
+
+    def values(self, observations: Any) -> Any:
+        """Predicts the values (...) of observations (..., M)."""
+        statistics = self._statistics
+        seen = (observations - statistics.mean) / np.sqrt(statistics.var + self._epsilon)
+        tensor = torch.as_tensor(np.clip(seen, -10, 10), dtype=torch.float32)
+        self._policy.load_state_dict(self._weights)  # the training is over
+        with torch.no_grad():
+            values = self._policy.predict_values(tensor.reshape(-1, tensor.shape[-1]))
+        return values.numpy().reshape(np.shape(observations)[:-1])
 
 
 class Told(BaseCallback):
@@ -39,7 +74,7 @@ class Told(BaseCallback):
 
         def kept(policy: Any, *, steps: int) -> Rollout:
             assert isinstance(self.model, PPO)
-            self.before = copied(self.model)
+            self.before = Copied(self.model)
             self.rollouts.append(collect(policy, steps=steps))
             return self.rollouts[-1]
 
@@ -62,18 +97,23 @@ def collector_of(folder: Path) -> Collector:
     return Collector(maker(folder), seed=5, infos=INFOS)
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture(autouse=True, scope="module")
 def one_thread() -> None:
     torch.set_num_threads(1)
 
 
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Told]:
+    """A training of three rollouts."""
+    with collector_of(tmp_path_factory.mktemp("told")) as collector:
+        made = Told(collector)
+        model_of(collector, steps=STEPS).learn(3 * STEPS * COPIES, callback=made)
+        yield made
+
+
 def test_log_probabilities_are_those_of_the_rollout_and_advantages_of_its_rewards(
-    tmp_path: Path,
+    told: Told,
 ) -> None:
-    with collector_of(tmp_path) as collector:
-        told = Told(collector)
-        model = model_of(collector, steps=STEPS)
-        model.learn(3 * STEPS * COPIES, callback=told)
     assert len(told.buffers) == 3
     cut_off = 0
     for rollout, buffer in zip(told.rollouts, told.buffers, strict=True):
@@ -115,10 +155,7 @@ def advantages(model: Any, rollout: Rollout) -> Any:
     return found
 
 
-def test_the_callback_hears_of_every_end(tmp_path: Path) -> None:
-    with collector_of(tmp_path) as collector:
-        told = Told(collector)
-        model_of(collector, steps=STEPS).learn(2 * STEPS * COPIES, callback=told)
+def test_the_callback_hears_of_every_end(told: Told) -> None:
     ends = [each.ends for each in told.rollouts]
     for name in INFOS:
         expected = sorted(str(value) for each in ends for value in each.infos[name])
@@ -127,31 +164,13 @@ def test_the_callback_hears_of_every_end(tmp_path: Path) -> None:
     assert sorted(info["episode"]["r"] for info in told.ends) == paid
 
 
-def test_statistics_are_those_of_the_observations_of_all_rollouts(tmp_path: Path) -> None:
-    with collector_of(tmp_path) as collector:
-        told = Told(collector)
-        model = model_of(collector, steps=STEPS)
-        model.learn(3 * STEPS * COPIES, callback=told)
-        normalisation = model.get_vec_normalize_env()
+def test_statistics_are_those_of_the_observations_of_all_rollouts(told: Told) -> None:
+    normalisation = told.model.get_vec_normalize_env()
     assert normalisation is not None
     seen = [each.observations[:-1].reshape(-1, 6) for each in told.rollouts]
     statistics: Any = normalisation.obs_rms
     assert statistics.mean == pytest.approx(np.concatenate(seen).mean(axis=0), abs=1e-4)
     assert statistics.var == pytest.approx(np.concatenate(seen).var(axis=0), abs=1e-3)
-
-
-class Guess(gymnasium.Env[Any, Any]):
-    """Episodes of one step, worth most for the actions (0.4, -0.6)."""
-
-    observation_space = Box(-1, 1, (3,), np.float32)
-    action_space = Box(-1, 1, (2,), np.float32)
-
-    def reset(self, **_: Any) -> Any:
-        return np.zeros(3, np.float32), {}
-
-    def step(self, action: Any) -> Any:
-        worth = -float(np.square(action - [0.4, -0.6]).sum())
-        return np.zeros(3, np.float32), worth, True, False, {}
 
 
 def test_it_leaves_no_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

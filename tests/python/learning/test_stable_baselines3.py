@@ -10,6 +10,7 @@ from vector_equality import assert_same
 import o80
 from o80.learning import Environment, VectorEnvironment
 
+pytestmark = pytest.mark.check  # needs Stable-Baselines3, which only `make check` installs
 COPIES = 4
 
 
@@ -27,7 +28,6 @@ def plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-@pytest.mark.check
 @pytest.mark.parametrize("task", [Reach, Goal])
 def test_does_what_a_dummy_vec_env_of_monitored_environments_does(task: type[Reach]) -> None:
     from stable_baselines3.common.monitor import Monitor
@@ -53,7 +53,6 @@ def test_does_what_a_dummy_vec_env_of_monitored_environments_does(task: type[Rea
     singles.close()
 
 
-@pytest.mark.check
 def test_gives_infos_of_ended_episodes_only_if_told_so() -> None:
     copies = adapted(Reach(COPIES, max_steps=3), infos="ends")
     copies.seed(1)
@@ -67,7 +66,6 @@ def test_gives_infos_of_ended_episodes_only_if_told_so() -> None:
     copies.close()
 
 
-@pytest.mark.check
 def test_options_attributes_methods_and_pictures_are_those_of_the_task() -> None:
     task = Reach(COPIES)
     copies = adapted(task, render_mode="rgb_array")
@@ -89,7 +87,6 @@ def test_options_attributes_methods_and_pictures_are_those_of_the_task() -> None
     copies.close()
 
 
-@pytest.mark.check
 def test_another_autoreset_mode_is_refused() -> None:
     with (
         VectorEnvironment(Reach(2)) as vector,

@@ -36,7 +36,6 @@ from o80.learning.training.learner import load
 
 pytestmark = pytest.mark.check  # needs torch, which only `make check` installs
 
-DOCS = Path(__file__).resolve().parents[3] / "docs"
 SMALL = {"rollout": 48, "batch_size": 16, "n_epochs": 2, "hidden": 8}
 SETTINGS = TrainingSettings(Guess, seed=4, copies=4, decisions=480, ppo=SMALL)
 

@@ -2,13 +2,16 @@
 
 import contextlib
 import math
+import signal
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
-from processes import WAIT
+from processes import O80, WAIT, Running, o80_says
 
 import o80
 from o80.difference import first_difference
@@ -37,18 +40,6 @@ def read_to_the_end(segment: str) -> list[int]:
     with o80.Frontend(segment, WAIT) as arm, contextlib.suppress(o80.BackendStopped):
         iterations.extend(each.iteration for each in arm.stream(since=0))
     return iterations
-
-
-def test_rows_appear_again_bit_for_bit(recorded: Path, segment: str) -> None:
-    with o80.play(recorded, speed=math.inf) as playback:
-        assert playback.wait(WAIT)
-        with o80.Frontend(segment) as arm:
-            assert arm.played
-            assert arm.robot == "two_joints"
-            assert arm.provenance == o80.open(recorded)[segment].epochs[0].provenance
-            assert arm.history().rows.tobytes() == rows_of(recorded, segment).rows.tobytes()
-        assert playback.rows == 201
-    assert segment not in [each.name for each in o80.segments()]
 
 
 def test_a_script_reads_a_robot_and_its_recording_alike(real_time: Path, segment: str) -> None:
@@ -93,10 +84,13 @@ def test_at_another_speed_rows_are_exactly_as_recorded(
         taken = time.monotonic() - begin
         with o80.Frontend(segment) as arm:
             assert arm.history().rows.tobytes() == recorded.rows.tobytes()
+            assert (arm.played, arm.robot, arm.row_age) == (True, "two_joints", None)
             assert arm.schema["clock"] == "simulated"
-            assert arm.row_age is None
+            assert arm.provenance == o80.open(real_time)[segment].epochs[0].provenance
+        assert playback.rows == len(recorded)
     seconds = float(recorded.time[-1] - recorded.time[0]) * 1e-9
     assert taken >= (0 if math.isinf(speed) else seconds / speed)
+    assert segment not in [each.name for each in o80.segments()]
 
 
 def test_a_part_is_played(recorded: Path, segment: str) -> None:
@@ -228,3 +222,67 @@ def test_a_fault_of_the_recorded_robot_is_raised_again(segment: str, tmp_path: P
     ):
         arm.burst(1, timeout=WAIT)
     assert segment not in [each.name for each in o80.segments()]
+
+
+# ----------------------------------------------------------------------------------------- o80 play
+
+
+@contextmanager
+def playing(*words: str | Path) -> Iterator[None]:
+    """o80 play, which Ctrl-C ends in order."""
+    with Running(O80, "play", *words) as player:
+        yield
+        player.send_signal(signal.SIGINT)
+        _, said = player.communicate(timeout=WAIT)
+        assert player.returncode == 0, said
+
+
+def test_other_commands_see_the_rows(recorded: Path, segment: str, tmp_path: Path) -> None:
+    copy = tmp_path / "copy.mcap"
+    with playing(recorded, "--fast"):
+        with o80.Frontend(segment, WAIT) as arm:
+            arm.wait_for(200, timeout=WAIT)
+        assert "played" in o80_says("list")
+        assert " 200 " in o80_says("echo", segment, "--count", "1")
+        said = o80_says("info", segment)
+        assert "a recording of 1000 Hz is played" in said
+        assert "robot two_joints, played, rows" in said
+        assert "is a recording that is being played" in o80_says("halt", segment, code=1)
+        o80_says("save", segment, "-o", copy)
+        o80_says("plot", segment, "-o", tmp_path / "run.png")
+    o80_says("diff", recorded, copy)
+    assert segment not in o80_says("list")
+
+
+def test_it_ends_with_the_last_row(recorded: Path) -> None:
+    said = o80_says("play", recorded, "--speed", "2")
+    assert "playing 0.1 s" in said or "playing 0.2 s" in said
+    assert "201 rows" in said
+
+
+def test_bursts_are_served(recorded: Path, segment: str) -> None:
+    with playing(recorded, "--bursts"), o80.Frontend(segment, WAIT) as arm:
+        assert arm.burst(20).iteration == 20
+
+
+def test_a_name_that_is_taken_is_refused(recorded: Path, segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment):
+        assert "--prefix" in o80_says("play", recorded, code=1)
+        o80_says("play", recorded, "--speed", "100", "--name", f"{segment}-b")
+
+
+def test_contradictory_options_are_refused_by_their_names(recorded: Path) -> None:
+    assert "--fast" in (said := o80_says("play", recorded, "--fast", "--speed", "2", code=2))
+    assert "--speed 2" in said
+    said = " ".join(o80_says("play", recorded, "--from", "5", "--to", "2", code=2).split())
+    assert "--to" in said
+    assert "--from (5 s)" in said
+    assert "--from" in o80_says("play", recorded, "--from", "-1", code=2)
+
+
+def test_a_name_that_is_no_file_is_told_how_to_become_one(tmp_path: Path) -> None:
+    said = o80_says("play", "arm", code=1)
+    assert "there is no file arm" in said
+    assert "o80 record arm -o arm.mcap" in said
+    said = o80_says("export", "arm", "--format", "lerobot", "-o", tmp_path / "set", code=1)
+    assert "o80 record arm -o arm.mcap" in said

@@ -173,21 +173,6 @@ def test_a_replay_of_a_damaged_journal_ends_in_order(segment: str) -> None:
     assert 0 < told < 150
 
 
-def test_a_damaged_description_is_told() -> None:
-    table = runs_in(o80.open(RECORDING))[0].description.table()
-    told = 0
-    for seed in range(150):
-        choose = random.Random(seed)
-        damaged = bytearray(table)
-        for _ in range(choose.randrange(1, 4)):
-            damaged[choose.randrange(len(table))] = choose.choice([0, 255, choose.randrange(256)])
-        try:
-            _core.Description(bytes(damaged)).schema()
-        except o80.Error:
-            told += 1
-    assert told > 0
-
-
 def damaged(data: bytes, draw: random.Random) -> bytes:
     """A file with flipped, cut, duplicated or spliced bytes."""
     a, b = sorted(draw.randrange(len(data)) for _ in range(2))

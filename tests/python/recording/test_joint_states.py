@@ -5,31 +5,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+from published_rows import messages_of
 from rosbags.highlevel import AnyReader
 
 import o80
 from o80.recording.epoch import topic_of
 from o80.recording.joint_states import joints_of
-from o80.recording.recorder import Recorder
 from o80.recording.scan import scan
 
 JOINT = np.dtype([("position", "f8"), ("velocity", "f4"), ("torque", "f8")])
 
 
 def joint_states(path: Path, segment: str) -> list[Any]:
-    topic = topic_of(segment, "joint_states")
-    with AnyReader([path]) as reader:
-        return [
-            reader.deserialize(raw, each.msgtype)
-            for each, _, raw in reader.messages()
-            if each.topic == topic
-        ]
+    return [message for _, message in messages_of(path, topic_of(segment, "joint_states"))]
 
 
 def recorded(segment: str, path: Path) -> o80.History:
-    recorder = Recorder(path, [segment])
-    recorder.catch_up()
-    recorder.finish()
+    o80.Recording(path, segment).close()
     return o80.open(path)[segment].history()
 
 
@@ -81,9 +73,7 @@ def test_a_successor_goes_on_in_the_same_channel(arm: o80.Frontend, tmp_path: Pa
     path = tmp_path / "run.mcap"
     for _ in range(2):
         arm.burst(10)
-        recorder = Recorder(path, [arm.segment], proceed=True)
-        recorder.catch_up()
-        recorder.finish()
+        o80.Recording(path, arm, proceed=path.exists()).close()
 
     assert len(joint_states(path, arm.segment)) == 21
     with AnyReader([path]) as reader:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
+from published_rows import messages_of
 from rosbags.highlevel import AnyReader
 
 import o80
@@ -330,13 +331,8 @@ def test_decisions_that_cannot_be_told_in_words_are_recorded_all_the_same(
         arm.add_command("elbow", 0.5, iterations=20)
         arm.burst(30)
     assert repr(o80.open(path)[arm.segment].epochs[0].journal()) == repr(arm.journal())
-    with AnyReader([path]) as reader:
-        lines: list[Any] = [
-            reader.deserialize(raw, each.msgtype)
-            for each, _, raw in reader.messages()
-            if each.topic == "/rosout"
-        ]
-    assert any("cannot be shown as text: request 999" in line.msg for line in lines)
+    lines = messages_of(path, "/rosout")
+    assert any("cannot be shown as text: request 999" in line.msg for _, line in lines)
 
 
 def test_names_with_one_topic_are_not_recorded_together(segment: str, tmp_path: Path) -> None:
@@ -368,9 +364,7 @@ def test_wherever_it_is_cut_whole_chunks_are_read_and_continued(
     chance = np.random.default_rng(3)
     for place in [*groups, *chance.integers(0, len(whole), CUTS)]:
         path.write_bytes(whole[: int(place)])
-        recorder = Recorder(path, [arm.segment], proceed=True)
-        recorder.catch_up()
-        recorder.finish()
+        o80.Recording(path, arm, proceed=True).close()
 
         segment = o80.open(path)[arm.segment]
         read = segment.history()

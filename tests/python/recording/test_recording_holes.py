@@ -170,9 +170,7 @@ def test_a_backend_that_was_killed_is_recorded_to_its_end(segment: str, tmp_path
         process.wait()
         recorder.catch_up()
         recorder.finish()
-        saved = Recorder(tmp_path / "saved.mcap", [segment])
-        saved.catch_up()
-        saved.finish()
+        o80.Recording(tmp_path / "saved.mcap", segment).close()
     for name in ("run", "saved"):
         (epoch,) = o80.open(tmp_path / f"{name}.mcap")[segment].epochs
         assert (epoch.rows, epoch.end, epoch.gaps) == (8, "killed", [])

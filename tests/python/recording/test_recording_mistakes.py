@@ -3,14 +3,12 @@
 import itertools
 import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from processes import run_o80
+from processes import run_o80, run_python
 
 import o80
 from o80.recording import source
@@ -40,6 +38,7 @@ def refused(*words: str | Path, code: int = 1) -> str:
             for text in ("", "1", "M", "-1M", "0s", "nans", "10 parsec", "1e400G")
         ),
         ("run.mcap", {"keep": "1G"}, "keep needs split"),
+        ("run.mcap", {"snapshots": -1.0}, "snapshots must be a positive number"),
         ("run.mcap", {"split": "1M", "keep": "10min"}, "a size such as 50G"),
         ("run.mcap", {"split": "1M", "keep": "1M"}, "at least twice split"),
     ],
@@ -150,7 +149,7 @@ def test_a_recording_that_is_open_when_its_program_ends_is_finished(tmp_path: Pa
         "recording.mark('begin')\n"
         "arm.burst(40)\n"
     )
-    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
+    run_python("-c", program)
     file = o80.open(tmp_path / "run.mcap")
     (segment,) = file.segments.values()
 
@@ -236,9 +235,7 @@ def test_a_sensor_without_actuators_is_recorded_plotted_and_exported(
     path = tmp_path / "run.mcap"
     with o80.Backend(segment, extended={"force": float}, bursting=True) as sensor:
         sensor.publish(None, {"force": 1.5})
-        recorder = Recorder(path, [segment])
-        recorder.catch_up()
-        recorder.finish()
+        o80.Recording(path, segment).close()
     history = o80.open(path)[segment].history()
 
     assert history.extended.force.tolist() == [1.5]

@@ -7,6 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from published_rows import messages_of
 from rosbags.highlevel import AnyReader
 
 import o80
@@ -139,12 +140,7 @@ def test_poses_of_bodies_are_added_as_transforms(arm: o80.Frontend, tmp_path: Pa
     model = mujoco.MjModel.from_xml_string(epoch.model)
     data = mujoco.MjData(model)
     bodies = [model.body(number).name for number in range(1, model.nbody)]
-    with AnyReader([shown]) as reader:
-        found: list[tuple[int, Any]] = [
-            (time, reader.deserialize(raw, each.msgtype))
-            for each, time, raw in reader.messages()
-            if each.topic == "/tf"
-        ]
+    found = messages_of(shown, "/tf")
     seconds = (rows.time[-1] - rows.time[0]) * 1e-9
     assert abs(len(found) - 60 * seconds) <= 2
     for time, message in found:
@@ -163,13 +159,9 @@ def test_poses_of_bodies_are_added_as_transforms(arm: o80.Frontend, tmp_path: Pa
             assert (turn.w, turn.x, turn.y, turn.z) == tuple(data.body(body).xquat)
     again = tmp_path / "again.mcap"
     cut(shown, again, transforms=10.0)
-    with AnyReader([again]) as reader:
-        count = sum(each.topic == "/tf" for each, _, _ in reader.messages())
-    assert abs(count - 10 * seconds) <= 2
+    assert abs(len(messages_of(again, "/tf")) - 10 * seconds) <= 2
     cut(shown, tmp_path / "kept.mcap")
-    with AnyReader([tmp_path / "kept.mcap"]) as reader:
-        kept = sum(each.topic == "/tf" for each, _, _ in reader.messages())
-    assert kept == len(found)
+    assert len(messages_of(tmp_path / "kept.mcap", "/tf")) == len(found)
 
 
 def test_a_robot_without_a_model_gets_no_transforms(
@@ -182,8 +174,7 @@ def test_a_robot_without_a_model_gets_no_transforms(
             backend.publish([0.0])
             o80.Recording(path, segment).close()
         cut(path, shown, transforms=60.0)
-        with AnyReader([shown]) as reader:
-            assert "/tf" not in reader.topics
+        assert messages_of(shown, "/tf") == []
         complained = f"no transforms of '{segment}': the model" in capsys.readouterr().err
         assert complained == bool(model)
 

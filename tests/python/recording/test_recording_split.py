@@ -70,41 +70,21 @@ def test_files_end_after_a_time(process: o80.robots.Process, tmp_path: Path) -> 
     assert [mark.name for mark in o80.open(path).marks] == ["end"]
 
 
-def test_it_is_continued_wherever_its_last_file_was_cut(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = in_parts(arm, tmp_path, 20)
-    last = sorted(path.iterdir())[-1]
-    whole = last.read_bytes()
-    chance = np.random.default_rng(2)
-    for cut in [0, 1, len(whole) - 1, *chance.integers(0, len(whole), 20)]:
-        for file in sorted(path.iterdir())[int(last.stem) + 1 :]:
-            file.unlink()
-        last.write_bytes(whole[: int(cut)])
-        recorder = Recorder(path, [arm.segment], proceed=True, split="8k")
-        play(arm, recorder, 2)
-        recorder.catch_up()
-        recorder.finish()
-        (epoch,) = o80.open(path)[arm.segment].epochs
-
-        assert epoch.history().rows.tobytes() == arm.history().rows.tobytes(), f"cut at {cut}"
-        assert repr(epoch.journal()) == repr(arm.journal())
-
-
-@pytest.mark.parametrize("size", [0, 5, 20])
-def test_a_recorder_killed_between_two_files_is_continued(
-    size: int, arm: o80.Frontend, tmp_path: Path
+@pytest.mark.parametrize(("lost", "size"), [(100, 0), (100, 5), (100, 20), (0, 3000), (0, 6000)])
+def test_a_recorder_killed_between_two_files_or_in_the_last_one_is_continued(
+    lost: int, size: int, arm: o80.Frontend, tmp_path: Path
 ) -> None:
     path = in_parts(arm, tmp_path, 20)
     *_, before, last = sorted(path.iterdir())
-    before.write_bytes(before.read_bytes()[:-100])  # not finished
+    before.write_bytes(before.read_bytes()[: -lost or None])  # not finished
     last.write_bytes(last.read_bytes()[:size])  # just created
     assert o80.open(path)[arm.segment].epochs[0].rows > 300
-    recorder = Recorder(path, [arm.segment], proceed=True, split="8k")
-    recorder.catch_up()
-    recorder.finish()
+    o80.Recording(path, arm, proceed=True, split="8k").close()
     recording = o80.open(path)
 
     assert recording.finished
     assert recording[arm.segment].history().rows.tobytes() == arm.history().rows.tobytes()
+    assert repr(recording[arm.segment].epochs[0].journal()) == repr(arm.journal())
     assert all(messages_of(file) > 0 for file in sorted(path.iterdir()))
 
 

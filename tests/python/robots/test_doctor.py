@@ -248,32 +248,30 @@ def test_commands_that_cure_the_boot_line_are_undone_by_theirs(tmp_path: Path) -
     assert run(finding.undo) == line
 
 
-def test_a_computer_that_missed_periods_does_not_serve_even_without_a_cause(tmp_path: Path) -> None:
-    missed = WakeUps(1000.0, 2.0, iterations=2000, overruns=7, skipped=9)
-    report = recorded("preempt_rt", tmp_path / "a").examine(1000, missed)
-    assert not report.serves
-    assert "did not finish 7 of 2000 iterations in time at 1000 Hz" in report.verdict
+MISSED = WakeUps(1000.0, 2.0, iterations=2000, overruns=7, skipped=9)
+HELD = replace(MISSED, overruns=0)
+FAILED = WakeUps(1000.0, 2.0, failed="no space left in /dev/shm")
 
-    held = replace(missed, overruns=0)
-    assert recorded("preempt_rt", tmp_path / "b").examine(1000, held, held).serves
 
-    report = recorded("preempt_rt", tmp_path / "d").examine(1000, held, missed)
-    assert not report.serves
-    assert "7 of 2000 iterations in time at 1000 Hz beside a load, and no cause" in report.verdict
-
-    report = recorded("workstation", tmp_path / "e").examine(1000, held, missed)
-    assert report.verdict.endswith(" beside a load: because of the kernel without PREEMPT_RT.")
-
-    unloaded = replace(held, failed="'arm' runs on this computer")
-    assert recorded("preempt_rt", tmp_path / "f").examine(1000, held, unloaded).serves
-
-    failed = WakeUps(1000.0, 2.0, failed="no space left in /dev/shm")
-    report = recorded("laptop", tmp_path / "g").examine(1000, failed, missed)
-    assert "could not be measured on this computer: no space left" in report.verdict
-    assert report.loaded is None
-    report = recorded("preempt_rt", tmp_path / "c").examine(1000, failed)
-    assert not report.serves
-    assert "could not be measured on this computer: no space left" in report.verdict
+@pytest.mark.parametrize(
+    ("name", "alone", "loaded", "said"),
+    [
+        ("preempt_rt", MISSED, None, "did not finish 7 of 2000 iterations in time at 1000 Hz"),
+        ("preempt_rt", HELD, HELD, ""),
+        ("preempt_rt", HELD, MISSED, "iterations in time at 1000 Hz beside a load, and no cause"),
+        ("workstation", HELD, MISSED, " a load: because of the kernel without PREEMPT_RT."),
+        ("preempt_rt", HELD, replace(HELD, failed="'arm' runs on this computer"), ""),
+        ("laptop", FAILED, MISSED, "could not be measured on this computer: no space left"),
+        ("preempt_rt", FAILED, None, "could not be measured on this computer: no space left"),
+    ],
+)
+def test_a_computer_that_missed_periods_does_not_serve_even_without_a_cause(
+    tmp_path: Path, name: str, alone: WakeUps, loaded: WakeUps | None, said: str
+) -> None:
+    report = recorded(name, tmp_path).examine(1000, alone, *([loaded] if loaded else []))
+    assert report.serves == (not said)
+    assert said in report.verdict
+    assert alone is not FAILED or report.loaded is None
 
 
 def test_a_refusal_that_the_robot_met_counts_whatever_the_files_say(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Robots: found, loaded, started as processes and inside this one."""
 
+import ast
 import importlib
 import os
 import tomllib
@@ -34,12 +35,17 @@ def test_robots_that_are_shipped_say_that_they_are_simulated_or_are_hardware() -
     assert silent == hardware
 
 
+def installed(folder: Path, name: str, entry_points: str) -> None:
+    """Writes what an installation notes of a package."""
+    metadata = folder / f"{name.replace('-', '_')}-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text(entry_points)
+
+
 def test_a_package_that_fails_does_not_hide_other_robots(tmp_path: Path) -> None:
     (tmp_path / "broken_arm.py").write_text("raise ValueError('no licence')\n")
-    metadata = tmp_path / "broken_arm-1.0.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: broken-arm\nVersion: 1.0\n")
-    (metadata / "entry_points.txt").write_text("[o80.robots]\nbroken = broken_arm:library\n")
+    installed(tmp_path, "broken-arm", "[o80.robots]\nbroken = broken_arm:library\n")
     program = (
         "import warnings, o80\n"
         "warnings.simplefilter('error')\n"
@@ -50,9 +56,7 @@ def test_a_package_that_fails_does_not_hide_other_robots(tmp_path: Path) -> None
         "    assert 'broken-arm' in str(error) and 'no licence' in str(error), error\n"
         "else: raise AssertionError\n"
     )
-    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
-
-    run_python("-c", program, env=environment)
+    run_python("-c", program, env=os.environ | {"PYTHONPATH": str(tmp_path)})
 
 
 def test_python_packages_bring_robots_and_frontends(tmp_path: Path, segment: str) -> None:
@@ -66,13 +70,8 @@ def test_python_packages_bring_robots_and_frontends(tmp_path: Path, segment: str
         "class Joints(o80.Frontend):\n"
         "    def elbow(self): return self.latest().observed[1]\n"
     )
-    metadata = tmp_path / "joints-1.0.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: joints\nVersion: 1.0\n")
-    (metadata / "entry_points.txt").write_text(
-        "[o80.robots]\njoints_of_a_package = joints:library\njoints_by_path = joints:path\n"
-        "[o80.frontends]\ntwo_joints = joints:Joints\n"
-    )
+    robots = "[o80.robots]\njoints_of_a_package = joints:library\njoints_by_path = joints:path\n"
+    installed(tmp_path, "joints", f"{robots}[o80.frontends]\ntwo_joints = joints:Joints\n")
     program = (
         "import o80\n"
         "assert 'joints_of_a_package' in [robot.name for robot in o80.robots.list()]\n"
@@ -83,17 +82,18 @@ def test_python_packages_bring_robots_and_frontends(tmp_path: Path, segment: str
         f"    with o80.Frontend({segment!r}) as other:\n"
         "        assert type(other).__name__ == 'Joints', other\n"
     )
-    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
-
-    run_python("-c", program, env=environment)
+    run_python("-c", program, env=os.environ | {"PYTHONPATH": str(tmp_path)})
 
 
 # ---------------------------------------------------------------------------- processes
 
 
 def test_the_segment_has_the_name_of_the_robot_unless_another_is_given() -> None:
-    with o80.robots.load("two_joints").start() as process:
+    robot = o80.robots.load("two_joints")
+    with robot.start() as process:
         assert process.segment == "two_joints"
+        with pytest.raises(o80.SegmentTaken, match=str(process.pid)):
+            robot.start()
 
 
 def test_options_and_flags_reach_the_robot(segment: str) -> None:
@@ -119,11 +119,6 @@ def test_options_and_flags_reach_the_robot(segment: str) -> None:
         assert file.stat().st_mode & 0o777 == 0o640
 
 
-def test_a_taken_name_is_refused(process: o80.robots.Process) -> None:
-    with pytest.raises(o80.SegmentTaken, match=str(process.pid)):
-        o80.robots.load("two_joints").start(process.segment)
-
-
 def test_a_process_never_stopped_is_warned_about_and_stopped(segment: str) -> None:
     process = o80.robots.load("two_joints").start(segment)
     popen = process._popen
@@ -135,12 +130,6 @@ def test_a_process_never_stopped_is_warned_about_and_stopped(segment: str) -> No
 
 
 # ---------------------------------------------------------------------------- inline
-
-
-def test_the_installation_is_found() -> None:
-    assert (o80.prefix() / "bin" / "o80-run").exists()
-    assert (o80.prefix() / "include" / "o80" / "o80.hpp").exists()
-    assert o80.__version__ == o80.version()
 
 
 STOPPED = """
@@ -194,3 +183,73 @@ def test_a_file_that_was_imported_by_a_link_is_the_same_file(
     for folder in ("real", "link"):
         place = f"{tmp_path / folder / 'linked_joint.py'}:Joint"
         assert o80.robots.load(place).name == "joint"
+
+
+# ----------------------------------------- controllers in real time, and the guard of their threads
+
+
+TWO_CONTROLLERS = """
+import os, subprocess, sys, threading, time, o80
+
+ready, over = threading.Event(), threading.Event()
+policies = {}
+
+def waits(process):
+    with process.frontend(real_time=True):
+        ready.set()
+        over.wait()
+        ask = "import os; print(os.sched_getscheduler(0))"
+        policies["child"] = subprocess.check_output([sys.executable, "-c", ask], text=True)
+        policies["waits"] = os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
+
+def spins(process):
+    with process.frontend(real_time=True) as arm:
+        arm.wait_for_next()
+        policies["before"] = os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
+        other = threading.Thread(target=waits, args=[process])
+        other.start()
+        ready.wait()
+        end = time.monotonic() + 30
+        while os.sched_getscheduler(0) & os.SCHED_FIFO and time.monotonic() < end:
+            pass
+        policies["after"] = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, 0
+        over.set()
+        other.join()
+
+robot = o80.robots.load("two_joints")
+with robot.start(sys.argv[1], policy="fifo", priority=50) as process:
+    controller = threading.Thread(target=spins, args=[process])
+    controller.start()
+    controller.join()
+    policies["main"] = os.sched_getscheduler(0), 0
+print(policies)
+"""
+
+
+def is_fifo_allowed() -> bool:
+    tries = "import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))"
+    return run_python("-c", tries, code=None).returncode == 0
+
+
+def test_a_controller_that_does_not_sleep_becomes_an_ordinary_thread_and_no_other(
+    segment: str,
+) -> None:
+    if not is_fifo_allowed():
+        pytest.skip("this user may not use the policy fifo")
+    ran = run_python("-c", TWO_CONTROLLERS, segment)
+    assert ast.literal_eval(ran.stdout) == {
+        "before": (os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, 49),
+        "after": (os.SCHED_OTHER, 0),
+        "waits": (os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, 49),
+        "child": "0\n",  # the guard is not inherited, so the policy is not
+        "main": (os.SCHED_OTHER, 0),
+    }
+    assert "lost its real-time priority" in ran.stderr
+
+
+def test_no_controller_gets_a_priority_above_that_of_the_loop(segment: str) -> None:
+    with o80.robots.load("two_joints").start(segment, policy="auto") as process:
+        assert "policy auto: other" in process.output, "it is simulated"
+        with pytest.warns(RuntimeWarning, match="the loop has no real-time priority above 1"):
+            process.frontend(real_time=True).close()
+        assert os.sched_getscheduler(0) == os.SCHED_OTHER

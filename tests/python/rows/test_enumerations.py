@@ -253,23 +253,6 @@ def test_info_lists_the_labels(segment: str) -> None:
     assert "enumerations\n  status: OK 0, LOST -2\n" in said
 
 
-def test_the_page_says_what_works(segment: str) -> None:
-    page = (Path(__file__).parents[3] / "docs" / "python.md").read_text()
-    block = page.partition("## Enumerations")[2].partition("```python")[2].partition("```")[0]
-    described = {
-        "gear": IntEnum("Gear", {"low": 1, "high": 2}),
-        "status": IntEnum("Status", {"ok": 0, "moved": 1, "lost": 10}),
-    }
-    gear, status = ({name: described[name]} for name in described)
-    with o80.Backend(segment, gear, extended=status) as backend:
-        backend.publish({"gear": "low"}, {"status": "moved"})
-        with o80.Frontend(segment) as frontend:
-            made: dict[str, Any] = {"arm": frontend}
-            exec(block, made)
-            assert made["good"].tolist() == [False]
-            frontend.forget_added()
-
-
 GEARS: Any = IntEnum("GEARS", {"low": 0, "high": 2})
 
 

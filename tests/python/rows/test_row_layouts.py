@@ -14,11 +14,12 @@ import published_rows
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mixed_robots import GROUPS, ROBOTS, SENSORS
+from mixed_robots import GROUPS, ROBOTS, SENSORS, Mode, recorded
 from published_rows import Published, check_every_reader
 
 import o80
 from o80.drivers import Reading
+from o80.recording.message_types import row_type
 from o80.rows.layout import field_view, with_padding
 from o80.rows.targets import states_of
 
@@ -103,6 +104,21 @@ def test_every_reader_sees_what_a_driver_in_python_published(
     changed = [name for name in before if before[name][5].tobytes() != after[name][5].tobytes()]
     found = run.difference and (run.difference.iteration, run.difference.field)
     assert found == ((5, changed[0]) if changed else None)
+
+
+def test_an_enumeration_has_constants_and_a_field_its_unit(arm: o80.Frontend) -> None:
+    text = row_type(recorded({"hand": {"mode": Mode}}, None, 1)._layout).definition
+
+    assert "int64 MODE_HOLD=-2" in text
+    assert "# what is asked less what is there [rad]" in row_type(arm._layout).definition
+
+
+def test_names_become_valid_in_messages_and_stay_different() -> None:
+    history = recorded({"Left Hand": "f8", "left-hand": "f8", "3rd": "f8"}, None, 2)
+    text = row_type(history._layout).definition
+    names = {line.split()[1] for line in text.splitlines() if line.startswith("float64")}
+
+    assert {"left_hand", "left_hand_2", "x_3rd"} <= names
 
 
 def test_rows_without_their_padding_are_no_history(segment: str) -> None:

@@ -2,7 +2,6 @@
 
 import json
 import signal
-import subprocess
 import urllib.request
 from pathlib import Path
 from typing import Any
@@ -10,13 +9,11 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from processes import O80, end_of, run_python
+from processes import O80, WAIT, Running, end_of, run_python
 
 import o80
 from o80.view import page_file
 from o80.view.page_file import write_page
-
-TIMEOUT = 60.0
 
 
 def look(url: str) -> dict[str, Any]:
@@ -26,7 +23,7 @@ def look(url: str) -> dict[str, Any]:
         b"{}",
         {"Authorization": f"Bearer {parts.query.removeprefix('token=')}"},
     )
-    with urllib.request.urlopen(request, timeout=TIMEOUT) as answer:
+    with urllib.request.urlopen(request, timeout=WAIT) as answer:
         found: dict[str, Any] = json.load(answer)
         return found
 
@@ -88,12 +85,10 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_command_prints_the_address_that_is_bound(arm: o80.Frontend) -> None:
-    command = [O80, "view", arm.segment]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
-        assert running.stdout is not None
+    with Running(O80, "view", arm.segment) as running:
         assert look(running.stdout.readline().strip())["source"] == arm.segment
         running.send_signal(signal.SIGINT)
-        assert running.wait(TIMEOUT) == 0
+        assert running.wait(WAIT) == 0
 
 
 def test_a_page_in_a_file_is_refused_with_a_cure(

@@ -2,20 +2,25 @@
 
 import base64
 import math
-import time
+import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from processes import until
 
 import o80
+from o80.recording.joint_states import joints_of
+from o80.view import foreign_model
 from o80.view.answers import Answers
 from o80.view.curves import STRETCHES, drawn_rows
 from o80.view.source_list import SourceList
+from o80.view.urdf import Links
 
 Look = Callable[..., dict[str, Any]]
 Floats = NDArray[np.float64]
@@ -184,12 +189,7 @@ def wait_for(
     look: Look, ready: Callable[[dict[str, Any]], bool], **requested: Any
 ) -> dict[str, Any]:
     """Looks until the list of segments was read anew."""
-    give_up = time.monotonic() + 60
-    while time.monotonic() < give_up:
-        answer = look(**requested)
-        if ready(answer):
-            return answer
-    raise AssertionError("it was never shown")
+    return until(lambda: answer if ready(answer := look(**requested)) else {})
 
 
 def test_marks_stand_in_the_curves(segment: str, tmp_path: Path) -> None:
@@ -401,3 +401,168 @@ def test_the_plan_of_chunks_is_drawn_ahead_of_the_newest_row(arm: o80.Frontend) 
         history.desired[:, 1],
     )
     np.testing.assert_allclose(values[second], wanted, atol=2e-3)
+
+
+# --------------------------------------------------------------------------------------------- URDF
+
+
+@pytest.mark.parametrize("robot", ["two_joints", "pam"])
+def test_a_chain_of_joints_ends_where_the_body_is(robot: str) -> None:
+    pytest.importorskip("mujoco")
+    with o80.robots.load(robot).inline() as arm:
+        targets = [0.7, -0.4] if robot == "two_joints" else [18_000, 8_000] * 4
+        arm.add_command(None, targets, iterations=100)
+        row = bytes(memoryview(arm.burst(300)))  # type: ignore[arg-type]
+        links, joints = Links.of(arm, "arm"), joints_of(arm._layout)
+        assert links is not None
+        assert joints is not None
+        places = [number.offset for number in joints.numbers["position"]]
+        names = dict(zip(places, joints.names, strict=True))
+        urdf: Any = ElementTree.fromstring(links.urdf(arm.schema, names))
+        angles = {name: np.frombuffer(row, "f8", 1, place)[0] for place, name in names.items()}
+        behind = {each.find("child").get("link"): each for each in urdf.iter("joint")}
+        found = [*links.places(row)]
+        assert found
+        for link, position, _ in found:
+            at, here = np.eye(4), link
+            while here != "world":
+                joint = behind[here]
+                at, here = moved(joint, angles) @ at, joint.find("parent").get("link")
+            assert np.allclose(at[:3, 3], position, atol=1e-6), link
+
+
+def moved(joint: Any, angles: dict[str, float]) -> Any:
+    """The place of a joint's child in its parent (4, 4)."""
+    origin = joint.find("origin")
+    found = np.eye(4)
+    roll, pitch, yaw = map(float, origin.get("rpy").split())
+    found[:3, :3] = turned([0, 0, 1], yaw) @ turned([0, 1, 0], pitch) @ turned([1, 0, 0], roll)
+    found[:3, 3] = [float(word) for word in origin.get("xyz").split()]
+    if joint.get("type") in ("revolute", "continuous"):
+        axis = [float(word) for word in joint.find("axis").get("xyz").split()]
+        found[:3, :3] = found[:3, :3] @ turned(axis, angles[joint.get("name")])
+    return found
+
+
+def turned(axis: list[float], angle: float) -> Any:
+    """The rotation about an axis (Rodrigues)."""
+    x, y, z = np.array(axis) / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+# ------------------- models of strangers: they read no file, do not hang and do not take all memory
+
+
+PLAIN = """
+<mujoco>
+  <worldbody>
+    <body name="arm"><joint name="elbow" axis="0 1 0"/><geom size="0.1 0.2" type="capsule"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def introduced(*names: str, model_files: bool = False) -> dict[str, Any]:
+    """Introduction that a page gets first."""
+    found: dict[str, Any] = Answers(SourceList(names, model_files=model_files), control=False).look(
+        {}
+    )["new"]
+    return found
+
+
+def recording_with(model: str, folder: Path, segment: str) -> Path:
+    """A recording of a robot that is drawn by this model."""
+    path = folder / "stranger.mcap"
+    with (
+        o80.Backend(segment, ["elbow"], model=model, joints={"elbow": "elbow"}) as backend,
+        o80.Recording(path, segment) as recording,
+    ):
+        backend.publish()
+        backend.step()
+        backend.publish()
+        while recording.rows < 2:
+            recording.flush()
+    o80.clean(segment)
+    return path
+
+
+def test_a_model_of_a_recording_is_drawn_as_that_of_the_robot(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, arm):
+        arm.burst(5)
+    scene = introduced(str(path))["scene"]
+    assert scene is not None
+    assert scene == introduced(arm.segment)["scene"]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        '<include file="{file}"/>',
+        '<asset><model name="a" file="{file}"/></asset>',
+        '<asset><mesh name="a" file="/dev/zero.stl"/></asset>',
+        '<asset><texture name="a" type="cube" fileup="/dev/zero"/></asset>',
+        '<asset><hfield name="a" file="{pipe}" size="1 1 1 1"/></asset>',
+    ],
+)
+def test_no_file_that_a_recording_names_is_read(line: str, segment: str, tmp_path: Path) -> None:
+    file, pipe = tmp_path / "secret.xml", tmp_path / "pipe.png"
+    file.write_text('<mujoco><worldbody><geom name="secret" size="1"/></worldbody></mujoco>')
+    os.mkfifo(pipe)  # who opens it waits forever
+    model = PLAIN.replace("<worldbody>", line.format(file=file, pipe=pipe) + "<worldbody>")
+    path = recording_with(model, tmp_path, segment)
+    new = introduced(str(path))
+    assert new["scene"] is None
+    assert "names a file" in new["no_scene"]
+    assert "--model-files" in new["no_scene"]
+    with o80.play(path, speed=float("inf")) as playback:
+        playback.wait()
+        assert "names a file" in introduced(segment)["no_scene"]
+
+
+def test_the_user_may_allow_the_files_of_models(segment: str, tmp_path: Path) -> None:
+    file = tmp_path / "floor.xml"
+    file.write_text('<mujoco><worldbody><geom type="plane" size="1 1 1"/></worldbody></mujoco>')
+    model = PLAIN.replace("<worldbody>", f'<include file="{file}"/><worldbody>')
+    path = recording_with(model, tmp_path, segment)
+    shapes = {geom["shape"] for geom in introduced(str(path), model_files=True)["scene"]["geoms"]}
+    assert shapes == {"plane", "capsule"}
+
+
+@pytest.mark.parametrize(
+    ("model", "why"),
+    [
+        ('<!DOCTYPE m [<!ENTITY a "b">]><mujoco/>', "document type"),
+        ("<mujoco>" + "<a>" * 5000 + "</a>" * 5000 + "</mujoco>", "nested more than"),
+        ("<mujoco><worldbody>", "no element found"),
+        ("<mujoco><nonsense/></mujoco>", "nonsense"),
+        (
+            '<mujoco><asset><texture name="a" type="2d" builtin="flat" width="200000" '
+            'height="200000"/></asset></mujoco>',
+            "",
+        ),
+        ('<mujoco><size memory="900G"/></mujoco>', "memory"),
+    ],
+)
+def test_hostile_models_are_told_and_the_rest_is_shown(
+    model: str, why: str, segment: str, tmp_path: Path
+) -> None:
+    path = recording_with(model, tmp_path, segment)
+    new = introduced(str(path))
+    assert new["scene"] is None
+    assert "cannot be read" in new["no_scene"]
+    assert why in new["no_scene"]
+    assert new["panels"] == ["elbow"]
+
+
+def test_a_model_that_takes_forever_is_given_up(
+    segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(foreign_model, "TIMEOUT", 2.0)
+    line = '<replicate count="1000000" euler="0 0 1"><geom size="1"/></replicate>'
+    model = PLAIN.replace("</worldbody>", f"{line}</worldbody>")
+    path = recording_with(model, tmp_path, segment)
+    assert "not compiled within 2 s" in introduced(str(path))["no_scene"]

@@ -5,8 +5,9 @@ import os
 import signal
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,6 +39,18 @@ POSE = "Array.from(page.scene.pose)"
 def browser() -> Iterator[Chromium]:
     with Chromium() as started:
         yield started
+
+
+@contextmanager
+def page_of(
+    browser: Chromium, *names: str | Path, control: bool = False, until: str = SHOWN, **how: Any
+) -> Iterator[Page]:
+    """A page of a server of its own, as soon as it shows what is there."""
+    with page_server([*map(str, names)], control=control) as server:
+        page = browser.page(server.url, **how)
+        page.wait_for(until)
+        yield page
+        page.close()
 
 
 def curve(part: str, what: str = "values", chart: int = 0) -> str:
@@ -83,9 +96,7 @@ def test_a_page_shows_the_robot_its_curves_and_its_state(browser: Chromium, segm
 def test_of_a_segment_that_is_waited_for_nothing_of_another_robot_is_shown(
     browser: Chromium, process: o80.robots.Process
 ) -> None:
-    with page_server([process.segment, "not-there"]) as server:
-        page = browser.page(server.url)
-        page.wait_for(SHOWN)
+    with page_of(browser, process.segment, "not-there") as page:
         looks = page.value("page.looks")
         page.value("document.getElementById('ghost-legend').hidden = false")
         page.value("page.choose('not-there')")
@@ -100,18 +111,12 @@ def test_of_a_segment_that_is_waited_for_nothing_of_another_robot_is_shown(
         page.value(f"page.choose('{process.segment}')")
         page.wait_for(SHOWN)
         assert not page.value("document.getElementById('halt').disabled")
-        page.close()
 
 
 def test_the_halt_button_halts_and_the_resume_button_resumes(
     browser: Chromium, process: o80.robots.Process
 ) -> None:
-    with (
-        process.frontend() as arm,
-        page_server([process.segment], control=True) as server,
-    ):
-        page = browser.page(server.url)
-        page.wait_for(SHOWN)
+    with process.frontend() as arm, page_of(browser, process.segment, control=True) as page:
         click(page, "halt")
         page.wait_for("!document.getElementById('resume').hidden")
         halt = arm.halted
@@ -122,7 +127,6 @@ def test_the_halt_button_halts_and_the_resume_button_resumes(
         click(page, "resume")
         page.wait_for("document.getElementById('resume').hidden")
         assert arm.halted is None
-        page.close()
 
 
 WORLD = """<mujoco><worldbody><geom type="plane" size="{0} {0} 1"/>
@@ -148,9 +152,8 @@ def test_robots_of_one_world_stand_in_one_scene(browser: Chromium, segment: str)
         other.publish([-0.4])
         without_model.publish([0.0])
         # after the rows: a page opens on a robot that has one
-        server = stack.enter_context(page_server([first, second, plain]))
-        page = browser.page(server.url)
-        page.wait_for("page.scene.robots.size === 2")
+        both = "page.scene.robots.size === 2"
+        page = stack.enter_context(page_of(browser, first, second, plain, until=both))
         assert page.value(drawn) == "box,capsule,capsule,plane", "the table and a floor once"
         assert page.value("page.scene.geoms.find((geom) => geom.shape === 'plane').size[0]") == 3
         assert page.value(f"page.scene.robots.get('{second}').pose[5]") == pytest.approx(
@@ -172,16 +175,13 @@ def test_robots_of_one_world_stand_in_one_scene(browser: Chromium, segment: str)
         page.value(f"page.choose('{plain}')")
         page.wait_for_text("so it is not drawn")
         assert page.value("page.scene.robots.size") == 2, "others are, and the page says so"
-        page.close()
 
 
 @pytest.mark.parametrize("dark", [False, True])
 def test_on_a_phone_nothing_runs_out_and_the_halt_button_is_large(
     browser: Chromium, process: o80.robots.Process, dark: bool
 ) -> None:
-    with page_server([process.segment], control=True) as server:
-        page = browser.page(server.url, 420, 860, dark=dark)
-        page.wait_for(SHOWN)
+    with page_of(browser, process.segment, control=True, width=420, height=860, dark=dark) as page:
         boxes = page.value(
             "Object.fromEntries([...document.querySelectorAll('[id]')].filter(e => e.offsetWidth)"
             ".map(e => [e.id, e.getBoundingClientRect().toJSON()]))"
@@ -203,17 +203,14 @@ def test_on_a_phone_nothing_runs_out_and_the_halt_button_is_large(
         ), "a long name is broken"
         light = page.value("getComputedStyle(document.body).backgroundColor.match(/\\d+/)[0]")
         assert (int(light) < 64) == dark
-        page.close()
 
 
 def test_the_slider_goes_back_through_the_ring_and_live_returns(
     browser: Chromium, process: o80.robots.Process
 ) -> None:
-    with process.frontend() as arm, page_server([process.segment]) as server:
+    with process.frontend() as arm, page_of(browser, process.segment) as page:
         arm.add_command("elbow", 1.0, iterations=400)
         arm.pulse_and_wait(60.0)
-        page = browser.page(server.url)
-        page.wait_for(SHOWN)
         rows = arm.history()
         row = rows[len(rows) // 2]
         zero = page.value("page.answer.last") - 0.0
@@ -229,15 +226,12 @@ def test_the_slider_goes_back_through_the_ring_and_live_returns(
         assert page.value("page.answer.iteration") == shown.iteration
         click(page, "live")
         page.wait_for("page.answer.last === page.answer.at")
-        page.close()
 
 
 def test_a_page_that_stalled_shows_a_fresh_row_at_once(
     browser: Chromium, process: o80.robots.Process
 ) -> None:
-    with process.frontend() as arm, page_server([process.segment]) as server:
-        page = browser.page(server.url)
-        page.wait_for(SHOWN)
+    with process.frontend() as arm, page_of(browser, process.segment) as page:
         page.value(
             "(() => { page.shown = []; const show = page.show.bind(page);"
             "page.show = (answer) => { page.shown.push(answer.iteration); show(answer); }; })()"
@@ -251,12 +245,10 @@ def test_a_page_that_stalled_shows_a_fresh_row_at_once(
         page.wait_for(f"page.answer.iteration > {woken}")
         old = [row for row in page.value("page.shown") if stalled < row <= woken]
         assert len(old) <= 1, "one answer may have been on its way, others show what is new"
-        page.close()
 
 
 def test_another_robot_that_takes_the_name_is_shown_anew(browser: Chromium, segment: str) -> None:
-    with page_server([segment]) as server:
-        page = browser.page(server.url)
+    with page_of(browser, segment, until="page.looks > 0") as page:
         page.wait_for_text("waiting")
         with o80.robots.load("two_joints").inline(segment):
             page.wait_for(SHOWN)
@@ -271,7 +263,6 @@ def test_another_robot_that_takes_the_name_is_shown_anew(browser: Chromium, segm
             charts = "document.getElementById('charts').offsetWidth"
             assert page.value(f"{charts} > 0.6 * document.body.offsetWidth"), "the curves have it"
             assert page.value("page.scene.canvas.hidden")
-        page.close()
 
 
 def test_a_recording_is_played_and_scrubbed(
@@ -281,9 +272,7 @@ def test_a_recording_is_played_and_scrubbed(
     with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, segment):
         arm.add_command("elbow", 1.0, iterations=2000)
         arm.burst(4000)
-    with page_server([str(path)]) as server:
-        page = browser.page(server.url)
-        page.wait_for(SHOWN)
+    with page_of(browser, path) as page:
         page.wait_for("page.answer.iteration > 0")
         assert page.value("document.getElementById('halt').disabled")
         page.wait_for_text("4001 rows")
@@ -300,7 +289,6 @@ def test_a_recording_is_played_and_scrubbed(
         click(page, "play")
         page.wait_for("!page.timeline.playing")
         assert page.value("page.answer.iteration") < 4000
-        page.close()
 
 
 def test_a_recording_in_a_file_needs_no_server_and_shows_the_same(
@@ -420,9 +408,7 @@ def test_a_file_opens_on_the_robot_that_a_page_opens_on(
 
 
 def test_numbers_are_readable_and_have_their_unit(browser: Chromium, arm: o80.Frontend) -> None:
-    with page_server([arm.segment]) as server:
-        page = browser.page(server.url)
-        page.wait_for("page.looks > 0")
+    with page_of(browser, arm.segment, until="page.looks > 0") as page:
         numbers = (
             "[[15710, 'Pa'], [0.5, 'rad'], [-0.00042, 'm'], [15710.4, ''], [0, 'm'],"
             "['nan', 'm'], [2e12, 'kg'], [1.5e-7, '']]"
@@ -450,7 +436,6 @@ def test_numbers_are_readable_and_have_their_unit(browser: Chromium, arm: o80.Fr
         assert {"0.5", "0.0005 s", "0.001 s", "0.0015 s"} <= set(texts)
         assert len(set(texts)) == len(texts), "each tick its own time"
         assert min(y for _, y in drawn) >= 8, "no number is cut off at the top"
-        page.close()
 
 
 def test_a_page_says_when_its_server_has_ended(browser: Chromium, arm: o80.Frontend) -> None:

@@ -7,13 +7,12 @@ from http.client import HTTPConnection
 from typing import Any
 
 import pytest
+from processes import WAIT
 
 import o80
 from o80.view.head import LARGEST_HEAD, LARGEST_REQUEST, Head, Refused, take_head
 from o80.view.serve import page_server
 from o80.view.server import PageServer
-
-TIMEOUT = 60.0
 
 
 @pytest.fixture
@@ -29,7 +28,7 @@ def server(arm: o80.Frontend, monkeypatch: pytest.MonkeyPatch) -> Iterator[PageS
 def ask(
     server: PageServer, method: str, target: str, headers: dict[str, str], body: str = ""
 ) -> tuple[int, str]:
-    connection = HTTPConnection("127.0.0.1", server.port, timeout=TIMEOUT)
+    connection = HTTPConnection("127.0.0.1", server.port, timeout=WAIT)
     try:
         connection.request(method, target, body, headers)
         answer = connection.getresponse()
@@ -45,13 +44,6 @@ def bearer(server: PageServer, **more: str) -> dict[str, str]:
 def post(server: PageServer, path: str, body: Any) -> tuple[int, dict[str, Any]]:
     code, text = ask(server, "POST", path, bearer(server), json.dumps(body))
     return code, json.loads(text)
-
-
-def raw(server: PageServer, *lines: str) -> str:
-    """The first line of the answer to what no HTTP library would send."""
-    with socket.create_connection(("127.0.0.1", server.port), TIMEOUT) as connection:
-        connection.sendall("\r\n".join([*lines, "", ""]).encode())
-        return connection.makefile().readline().strip()
 
 
 def test_the_page_comes_with_the_token_alone(server: PageServer) -> None:
@@ -116,13 +108,10 @@ def test_a_name_that_another_site_points_here_is_refused(server: PageServer) -> 
     "path",
     ["/../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "//etc/passwd", "/page/main.js", "/\\"],
 )
-def test_there_is_no_file_to_reach(server: PageServer, path: str) -> None:
-    first = raw(
-        server,
-        f"GET {path}?token={server.token} HTTP/1.1",
-        f"Host: 127.0.0.1:{server.port}",
-    )
-    assert first == "HTTP/1.1 404 Not Found"
+def test_there_is_no_file_to_reach(server: PageServer, arm: o80.Frontend, path: str) -> None:
+    first = f"GET {path}?token={server.token} HTTP/1.1"
+    answer = answer_to(server, request(server, arm, "Connection: close", first=first))
+    assert answer.startswith("HTTP/1.1 404 Not Found")
 
 
 def test_invalid_requests_are_answered(server: PageServer) -> None:
@@ -146,7 +135,7 @@ def test_a_halt_is_always_allowed_and_a_resume_only_with_control(segment: str) -
         with page_server([segment]) as server:
             code, answer = post(server, "/halt", {"segment": segment, "reason": "the ball"})
             assert code == 200
-            frontend.wait_for(frontend.published + 2, timeout=TIMEOUT)
+            frontend.wait_for(frontend.published + 2, timeout=WAIT)
             halt = frontend.halted
             assert halt is not None
             assert halt.number == answer["halt"]
@@ -195,7 +184,7 @@ def test_only_shown_segments_are_halted(server: PageServer) -> None:
 
 def answer_to(server: PageServer, request: str) -> str:
     """All that is sent until the server closes the connection."""
-    with socket.create_connection(("127.0.0.1", server.port), TIMEOUT) as connection:
+    with socket.create_connection(("127.0.0.1", server.port), WAIT) as connection:
         connection.sendall(request.encode("latin-1"))
         return connection.makefile(encoding="latin-1", newline="").read()
 

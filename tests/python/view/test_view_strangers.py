@@ -3,7 +3,6 @@
 import json
 import select
 import socket
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -13,12 +12,12 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from processes import WAIT, Running
 
 import o80
 from o80.view.serve import page_server
 from o80.view.server import PageServer
 
-TIMEOUT = 60.0
 NEVER = 1e6  # [s]
 
 Serve = Callable[..., PageServer]
@@ -43,7 +42,7 @@ class Holder:
 
     def __init__(self, port: int, token: str) -> None:
         self._token = token
-        self.kept = HTTPConnection("127.0.0.1", port, timeout=TIMEOUT)
+        self.kept = HTTPConnection("127.0.0.1", port, timeout=WAIT)
         self.kept.connect()
         self.kept.auto_open = False  # a connection that was closed is an error
 
@@ -114,7 +113,7 @@ def strangers(port: int, count: int) -> Iterator[Iterator[socket.socket]]:
         def connect() -> Iterator[socket.socket]:
             sent = hostile(port)
             for number in range(count):
-                connection = socket.create_connection(("127.0.0.1", port), TIMEOUT)
+                connection = socket.create_connection(("127.0.0.1", port), WAIT)
                 all_of_them.enter_context(connection)
                 connection.sendall(sent[number % len(sent)])
                 yield connection
@@ -166,7 +165,7 @@ def test_holders_that_stall_in_a_body_do_not_keep_a_halt_out(
     ).encode()
     with ExitStack() as stalled:
         for _ in range(20):
-            connection = socket.create_connection(("127.0.0.1", server.port), TIMEOUT)
+            connection = socket.create_connection(("127.0.0.1", server.port), WAIT)
             stalled.enter_context(connection).sendall(head)
         assert halt(server.port, server.token, arm.segment) > 0
 
@@ -200,7 +199,7 @@ def test_each_byte_does_not_renew_the_deadline(
 def drip_until_closed(connection: socket.socket) -> None:
     poll = select.poll()
     poll.register(connection, select.POLLIN)
-    give_up = time.monotonic() + TIMEOUT
+    give_up = time.monotonic() + WAIT
     while time.monotonic() < give_up:
         try:
             connection.send(b"a")
@@ -214,7 +213,7 @@ def drip_until_closed(connection: socket.socket) -> None:
 
 def test_a_refusal_is_told_after_a_while_and_its_connection_closed(serve: Serve) -> None:
     server = serve(REFUSED_AFTER=0.05, CLOSED_AFTER=0.05)
-    with socket.create_connection(("127.0.0.1", server.port), TIMEOUT) as connection:
+    with socket.create_connection(("127.0.0.1", server.port), WAIT) as connection:
         connection.sendall(hostile(server.port)[5])
         text = connection.makefile().read()  # until it is closed
         assert text.startswith("HTTP/1.1 403")
@@ -225,18 +224,12 @@ def test_a_refusal_is_told_after_a_while_and_its_connection_closed(serve: Serve)
 def test_halts_arrive_with_few_descriptors(arm: o80.Frontend) -> None:
     options = json.dumps({"names": [arm.segment]})
     command = 'ulimit -n 64 && exec "$0" -m o80.view "$1"'
-    with subprocess.Popen(
-        ["sh", "-c", command, sys.executable, options],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-    ) as process:
-        assert process.stdout is not None
+    with Running("sh", "-c", command, sys.executable, options) as process:
         said = json.loads(process.stdout.readline())
         token = urlsplit(said["url"]).query.removeprefix("token=")
         with strangers(said["port"], 150) as attack:
             for number, _ in enumerate(attack):
                 if number % 15 == 14:
                     assert halt(said["port"], token, arm.segment) == 1 + number // 15
-        assert process.stdin is not None
         process.stdin.close()
-        assert process.wait(TIMEOUT) == 0
+        assert process.wait(WAIT) == 0
