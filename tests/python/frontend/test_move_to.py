@@ -58,6 +58,7 @@ def joints(plant: Plant, segment: str) -> Iterator[o80.Frontend]:
         yield frontend
 
 
+# rule S5
 def test_says_where_the_robot_is(plant: Plant, joints: o80.Frontend) -> None:
     plant.stuck = True
     with pytest.raises(o80.NotReached) as raised:

@@ -10,17 +10,18 @@
 #include "memory/child_process.hpp"
 #include "o80/memory/segment_list.hpp"
 #include "robot/fake_simulator.hpp"
-#include "runtime/frontend/link.hpp"
 
 namespace o80::test {
 namespace {
 
-using ::testing::HasSubstr;
-
 class InlineGroupTest : public ManualBackendTest {
  protected:
-  static InlineGroup::Options group_of(std::size_t copies, std::size_t threads = 2) {
-    return {.copies = copies, .threads = threads, .backend = InlineGroup::default_options()};
+  static InlineGroup::Options group_of(std::size_t copies, std::size_t threads = 2,
+                                       const InlineGroup* sharing = nullptr) {
+    return {.copies = copies,
+            .threads = threads,
+            .sharing = sharing,
+            .backend = InlineGroup::default_options()};
   }
 };
 
@@ -29,11 +30,8 @@ std::vector<std::byte> dawdle(std::size_t copies) {
 }
 
 std::size_t open_files() {
-  std::size_t count = 0;
-  for ([[maybe_unused]] const auto& each : std::filesystem::directory_iterator("/proc/self/fd")) {
-    ++count;
-  }
-  return count;
+  const std::filesystem::directory_iterator files("/proc/self/fd");
+  return static_cast<std::size_t>(std::distance(begin(files), end(files)));
 }
 
 TEST_F(InlineGroupTest, SendsNoBatchForTargetsOfEachIterationUnlessAJournalNeedsIt) {
@@ -57,9 +55,7 @@ TEST_F(InlineGroupTest, SendsNoBatchForTargetsOfEachIterationUnlessAJournalNeeds
 
 TEST_F(InlineGroupTest, IsFollowedByAnotherGroupCopyByCopyInTheSameCall) {
   InlineGroup leader(fake(), {}, group_of(9, 3));
-  InlineGroup::Options sharing = group_of(9);
-  sharing.sharing = &leader;
-  InlineGroup follower(fake(), {}, sharing);
+  InlineGroup follower(fake(), {}, group_of(9, 2, &leader));
   InlineGroup first(fake(), {}, group_of(9, 1));
   InlineGroup second(fake(), {}, group_of(9, 1));
   GroupBurst leading(leader, 2, 1, 4), following(follower, 2, 4, 4);
@@ -172,35 +168,32 @@ TEST_F(InlineGroupTest, EndsBetweenTwoIterationsWhenItsCallerSaysSoOrThrowsOrHas
   expect_end_between_iterations<TimeoutError>(late, std::chrono::milliseconds(60), {});
 }
 
-TEST_F(InlineGroupTest, LeavesTheOthersTheirCallWhenOneThreadUsesIt) {
-  InlineGroup group(fake(), {}, group_of(2));
-  std::vector<std::uint32_t> all{0, 1};
-  GroupBurst burst(group, 2, 1, 4);
-  std::string said;
-  const auto nested = [&] {
-    said = message_of<Error>([&] { burst.run(); });
-    return false;
-  };
-  EXPECT_THROW(group.request(3, all, dawdle(2), kPatience, nested), Cancelled);
-  EXPECT_THAT(said, HasSubstr("call it from one thread at a time"));
-  burst.run();
-}
-
-TEST_F(InlineGroupTest, SharesItsThreadsInTurn) {
-  InlineGroup leader(fake(), {}, group_of(2));
-  InlineGroup::Options sharing = group_of(3);
-  sharing.sharing = &leader;
-  InlineGroup follower(fake(), {}, sharing);
-  GroupBurst burst(follower, 2, 1, 4);
-  EXPECT_EQ(follower.threads(), 2U);
+/// What a burst says within a request of a group of two.
+std::string said_within_a_request(InlineGroup& group, GroupBurst& burst) {
   const std::vector<std::uint32_t> all{0, 1};
   std::string said;
   const auto nested = [&] {
     said = message_of<Error>([&] { burst.run(); });
     return false;
   };
-  EXPECT_THROW(leader.request(3, all, dawdle(2), kPatience, nested), Cancelled);
-  EXPECT_THAT(said, HasSubstr("shares them with: call one after the other"));
+  EXPECT_THROW(group.request(3, all, dawdle(2), kPatience, nested), Cancelled);
+  return said;
+}
+
+TEST_F(InlineGroupTest, LeavesTheOthersTheirCallWhenOneThreadUsesIt) {
+  InlineGroup group(fake(), {}, group_of(2));
+  GroupBurst burst(group, 2, 1, 4);
+  EXPECT_THAT(said_within_a_request(group, burst), HasSubstr("call it from one thread at a time"));
+  burst.run();
+}
+
+TEST_F(InlineGroupTest, SharesItsThreadsInTurn) {
+  InlineGroup leader(fake(), {}, group_of(2));
+  InlineGroup follower(fake(), {}, group_of(3, 2, &leader));
+  GroupBurst burst(follower, 2, 1, 4);
+  EXPECT_EQ(follower.threads(), 2U);
+  EXPECT_THAT(said_within_a_request(leader, burst),
+              HasSubstr("shares them with: call one after the other"));
   leader.close();
   burst.run();
   EXPECT_EQ(burst.last_iteration(2), 4);
@@ -424,9 +417,7 @@ void expect_close_during(RunBurst&& burst, Close&& close) {
 TEST_F(InlineGroupTest, IsClosedInASignalHandlerOfItsCallWhichDoesNotWaitForItself) {
   const RobotTable& robot = *robot_table<Gated>("gated");
   InlineGroup leader(robot, {}, group_of(2));
-  InlineGroup::Options sharing = group_of(2);
-  sharing.sharing = &leader;
-  InlineGroup follower(robot, {}, sharing);
+  InlineGroup follower(robot, {}, group_of(2, 2, &leader));
   GroupBurst leading(leader, 1, 1, 1), following(follower, 1, 1, 1);
   const InlineGroup::Following then{&follower, &following.plan, {}};
   leading.plan.then = &then;

@@ -2,9 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include "memory/private_directory.hpp"
-#include "o80/base/time.hpp"
-
 namespace o80::test {
 namespace {
 
@@ -22,12 +19,6 @@ RowHead row(std::int64_t iteration, std::uint32_t overruns, std::uint32_t skippe
   head.skipped = skipped;
   head.time = iteration * kSecond / 100;  // 100 Hz are reached
   return head;
-}
-
-TEST(OverrunReport, SaysNothingWhileAllIterationsAreInTime) {
-  OverrunReport report(kPeriod);
-  EXPECT_FALSE(report.poll(row(1000, 0), kSecond));
-  EXPECT_FALSE(report.poll(row(2000, 0), 2 * kSecond));
 }
 
 TEST(OverrunReport, SaysHowManyAtOnceAndThenAtALimitedRate) {
@@ -74,15 +65,6 @@ TEST(HangReport, SaysWhatHangsAtALimitedRateAndWhenItIsOver) {
   loop.slow_verb = Verb::none;
   EXPECT_EQ(report.poll(loop, 13 * kSecond).value_or(""), "the loop continues");
   EXPECT_FALSE(report.poll(loop, 14 * kSecond));
-}
-
-TEST(LoopReport, EndsAtOnceAlthoughItHasFoundNoBackend) {
-  const PrivateDirectory directory;
-  const std::int64_t begin = monotonic_now();
-  {
-    const LoopReport report("gone");
-  }
-  EXPECT_LT(monotonic_now() - begin, 5 * kSecond) << "it waits 5 s for a backend that may come";
 }
 
 }  // namespace
