@@ -217,46 +217,6 @@ TEST_F(InlineGroupTest, ServesRequestsWithAPayloadForEachCopy) {
                         "was saved there"));
 }
 
-TEST_F(InlineGroupTest, GathersObservationsAndFlagsOfTheNewestRows) {
-  InlineGroup group(fake(), {}, group_of(3));
-  const RowLayout& layout = group.description().layout;
-  const RowGather wanted{
-      .numbers = {{.from = {layout.observed, Kind::float64}, .offset = 0.5, .scale = 2},
-                  {.from = {layout.observed + 8, Kind::float64}, .low = -0.25, .high = 0.25},
-                  {.from = {layout.extended + 8, Kind::int32}}},
-      .flags = {{.from = {layout.extended + 12, Kind::uint8}, .value = 0},
-                {.from = {layout.extended + 8, Kind::int32},
-                 .compare = EventFlag::Compare::greater_equal,
-                 .value = 4}}};
-  std::vector<float> observations(9, -1);
-  std::vector<std::uint8_t> flags(6, 9);
-  group.gather(wanted, {observations, flags});
-  const auto expect = [&](std::size_t copy) {
-    const UntypedObservation row = group.attach(copy)->latest();
-    const auto left = unpack<double>(row.observed());
-    const auto right = unpack<double>(row.observed() + 8);
-    const auto count = unpack<std::int32_t>(row.extended() + 8);
-    EXPECT_EQ(observations[copy * 3], static_cast<float>((left - 0.5) * 2));
-    EXPECT_EQ(observations[copy * 3 + 1], static_cast<float>(std::clamp(right, -0.25, 0.25)));
-    EXPECT_EQ(observations[copy * 3 + 2], static_cast<float>(count));
-    EXPECT_EQ(flags[copy * 2], count % 2);
-    EXPECT_EQ(flags[copy * 2 + 1], count >= 4 ? 1 : 0);
-  };
-  for (std::size_t copy = 0; copy < 3; ++copy) expect(copy);
-  GroupBurst burst(group, 2, 1, 3);
-  for (double& target : burst.targets) target = 1;
-  for (const std::vector<std::uint32_t>& chosen :
-       {std::vector<std::uint32_t>{0, 1, 2}, std::vector<std::uint32_t>{1}}) {
-    group.burst(burst.plan, chosen, kPatience);
-    for (std::size_t copy = 0; copy < 3; ++copy) expect(copy);
-  }
-  EXPECT_EQ(flags[3], 1);
-  const std::vector<std::uint32_t> one{1};
-  group.request(0, one, std::vector<std::byte>(sizeof(Reset)), kPatience);
-  for (std::size_t copy = 0; copy < 3; ++copy) expect(copy);
-  EXPECT_EQ(flags[3], 0);
-}
-
 TEST_F(InlineGroupTest, RefusesMemoryOfAnotherSizeAndMoreRowsThanTheHistoryHas) {
   InlineGroup group(fake(), {}, group_of(2));
   GroupBurst burst(group, 2, 1, 3);

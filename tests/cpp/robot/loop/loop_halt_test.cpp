@@ -20,23 +20,6 @@ class LoopHaltTest : public FakeDriverTest {
   }
 };
 
-TEST_F(LoopHaltTest, ADriverHaltsWithItsReading) {
-  const auto loop = started();
-  FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
-    if (reading.iteration() >= 3) reading.halt("the belt slipped");
-  };
-  UntypedFrontend frontend("fake");
-  add(frontend, 0, 10.0, {.pace = iterations(10)});
-  frontend.start_burst(10);
-  EXPECT_EQ(loop->run_granted(kAll), Step::standing);
-  EXPECT_EQ(frontend.published(), 3);
-  ASSERT_TRUE(frontend.halted());
-  EXPECT_EQ(frontend.halted()->cause, HaltCause::driver);
-  EXPECT_EQ(frontend.halted()->number, 1U);
-  EXPECT_EQ(frontend.halted()->reason(), "the belt slipped");
-  EXPECT_EQ(FakeDriver::calls.halted, 1) << "the driver is told that a halt begins";
-}
-
 // rule H10
 TEST_F(LoopHaltTest, ADriverMayRefuseToResume) {
   const auto loop = started();

@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include "memory/private_directory.hpp"
+#include "o80/base/time.hpp"
+
 namespace o80::test {
 namespace {
 
@@ -65,6 +68,15 @@ TEST(HangReport, SaysWhatHangsAtALimitedRateAndWhenItIsOver) {
   loop.slow_verb = Verb::none;
   EXPECT_EQ(report.poll(loop, 13 * kSecond).value_or(""), "the loop continues");
   EXPECT_FALSE(report.poll(loop, 14 * kSecond));
+}
+
+TEST(LoopReport, EndsAtOnceAlthoughItHasFoundNoBackend) {
+  const PrivateDirectory directory;
+  const std::int64_t begin = monotonic_now();
+  {
+    const LoopReport report("gone");
+  }
+  EXPECT_LT(monotonic_now() - begin, 5 * kSecond) << "it waits 5 s for a backend that may come";
 }
 
 }  // namespace

@@ -8,10 +8,6 @@ namespace {
 
 using HaltTest = ManualBackendTest;
 
-std::uint32_t halted_in_row(const UntypedFrontend& frontend, Iteration k) {
-  return frontend.wait_for(k, kAtOnce).head().halted;
-}
-
 // rules H3, H6
 TEST_F(HaltTest, ActsInTheFirstStepBegunAfterIt) {
   Trace trace({.segment = "pair"});
@@ -93,7 +89,7 @@ TEST_F(HaltTest, IsLatchedBeforeRowZero) {
   halt("pair", "not today", kPatience);
   manual.start();
   UntypedFrontend frontend("pair");
-  EXPECT_EQ(halted_in_row(frontend, 0), 1U);
+  EXPECT_EQ(frontend.latest().head().halted, 1U);
   ASSERT_TRUE(frontend.halted());
   EXPECT_EQ(frontend.halted()->reason(), "not today");
 }

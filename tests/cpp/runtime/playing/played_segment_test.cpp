@@ -66,16 +66,6 @@ class PlayedSegmentTest : public ManualBackendTest {
   Rows rows_;
 };
 
-TEST_F(PlayedSegmentTest, ShowsReadersTheRecordedRowsBitForBit) {
-  PlayedSegment played(options());
-  EXPECT_EQ(played.publish(all(), {}), static_cast<std::size_t>(kRows));
-
-  const UntypedFrontend reader("pair");
-  EXPECT_EQ(reader.published(), kRows - 1);
-  EXPECT_EQ(reader.history(0, kRows - 1).bytes, rows_.bytes);
-  EXPECT_EQ(reader.latest().iteration(), kRows - 1);
-}
-
 TEST_F(PlayedSegmentTest, HasTheDescriptionOfTheRecordedRobot) {
   PlayedSegment played(options());
   played.publish(rows(0, 0), {});
