@@ -73,18 +73,24 @@ class ChildProcess {
   while (true) pause();
 }
 
-/// A ChildProcess that is ready when it has been made; from its `stand()` on it does nothing.
-class StandingProcess : public ChildProcess {
+/// A ChildProcess that is ready when it has been made.
+class ReadyProcess : public ChildProcess {
+ public:
+  explicit ReadyProcess(const std::function<void(const Ready&)>& body) : ChildProcess(body) {
+    if (!wait_until_ready()) throw std::runtime_error("the child process ended without a word");
+  }
+};
+
+/// A ReadyProcess that does nothing from its `stand()` on.
+class StandingProcess : public ReadyProcess {
  public:
   using Stand = std::function<void()>;
 
   explicit StandingProcess(const std::function<void(const Stand&)>& body)
-      : ChildProcess([&](const Ready& ready) {
+      : ReadyProcess([&](const Ready& ready) {
           body([&] {
             ready();
             pause_for_ever();
           });
-        }) {
-    if (!wait_until_ready()) throw std::runtime_error("the child process ended without a word");
-  }
+        }) {}
 };

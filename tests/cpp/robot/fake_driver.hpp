@@ -14,6 +14,7 @@
 #include "o80/robot/make_table.hpp"
 #include "o80/robot/plant_requests.hpp"
 #include "places.hpp"
+#include "robot/loop/loop.hpp"
 #include "runtime/manual_backend.hpp"
 
 namespace o80::test {
@@ -157,7 +158,22 @@ class FakeDriverTest : public ManualBackendTest {
     FakeDriver::own_gap = 0;
   }
   static const RobotTable& table() { return *robot_table<FakeDriver>("fake"); }
+  static std::unique_ptr<DriverInstance> driver(const OptionValues& options = {}) {
+    return std::make_unique<DriverInstance>(table(), options);
+  }
+  static std::unique_ptr<Loop> started(const OptionValues& options = {},
+                                       const BackendOptions& backend = {.segment = "fake",
+                                                                        .bursting = true}) {
+    auto loop = std::make_unique<Loop>(driver(options), backend);
+    loop->start();
+    return loop;
+  }
 };
+
+inline Batch poke(UntypedFrontend& frontend, std::uint32_t how) {
+  add_request(frontend, Poke{how});
+  return frontend.pulse();
+}
 
 /// What a program did.
 struct Outcome {

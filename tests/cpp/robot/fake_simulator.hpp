@@ -19,11 +19,13 @@ struct Dawdle {
 O80_DESCRIBE(Dawdle, until);
 
 /// A simulated plant for groups: no state outside of the object, and an evolution in which every
-/// number depends on all that happened before.
+/// number depends on all that happened before. `guarded`: it has limits of every kind, is halted
+/// now and then, its first actuator interrupted; its second one follows when it is idle.
 class FakeSimulator {
  public:
   struct Config {
     double start = 0;
+    bool guarded = false;
   };
   struct Sensors {
     double sum = 0;
@@ -40,6 +42,10 @@ class FakeSimulator {
     schema.simulated();
     schema.actuator(0).name("left");
     schema.actuator(1).name("right");
+    if (!config_.guarded) return;
+    schema.actuator(0).limits(
+        {.minimum = -30, .maximum = 30, .speed = 20'000, .acceleration = 1e7, .jerk = 4e9});
+    schema.actuator(1).limits({.minimum = -31, .maximum = 31}).when_idle(WhenIdle::follow);
   }
   void start() {}
   void write(const Desired<FakeSimulator>& desired) {
@@ -59,6 +65,9 @@ class FakeSimulator {
       reading.ended<Dawdle>(Served::done());
     }
     if (now_.at[1] > 50) reading.halt("right is too far");
+    if (!config_.guarded) return;
+    if (now_.sensors.count % 7 == 3) reading.interrupt(0);
+    if (now_.sensors.count % 31 == 17) reading.halt("it is time for a halt");
   }
   Served on(const Reset& reset) {
     begin(reset.seed);
@@ -97,7 +106,7 @@ class FakeSimulator {
   std::map<std::uint32_t, State> saved_;
   std::uint32_t dawdles_ = 0;
 };
-O80_DESCRIBE(FakeSimulator::Config, start);
+O80_DESCRIBE(FakeSimulator::Config, start, guarded);
 O80_DESCRIBE(FakeSimulator::Sensors, sum, count, odd);
 
 inline const RobotTable& fake() { return *robot_table<FakeSimulator>("fake"); }

@@ -31,6 +31,19 @@ class HostileFrontend {
   std::uint64_t send(BatchBuilder& builder, BatchRecord batch) {
     return sender_->send(std::as_bytes(builder.seal(batch)), offsetof(BatchRecord, ticket));
   }
+  /// Sends a command for the first actuator.
+  std::uint64_t command(double target, BatchRecord batch, RecordHead head = {}) {
+    BatchBuilder builder;
+    builder.command(head, std::as_bytes(std::span(&target, 1)));
+    return send(builder, batch);
+  }
+  /// The id of a batch with one record.
+  CommandId draw_id() {
+    const CommandId id = sender_->next_id();
+    sender_->draw_ids(id + 3);
+    return id;
+  }
+  Status status(CommandId id) const { return static_cast<Status>(sender_->status(id).word.status); }
   /// One scribble somewhere, of something that was meant to be a batch, a count, or nothing.
   void scribble(std::mt19937_64& random) {
     const std::uint64_t word = random() >> random() % 64;

@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <functional>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -15,10 +16,15 @@
 #include "o80/robot/plant_requests.hpp"
 #include "o80/runtime/backend.hpp"
 #include "o80/runtime/frontend.hpp"
+#include "o80/runtime/journal.hpp"
 #include "o80/runtime/robot_types.hpp"
 #include "runtime/frontend/link.hpp"
 
 namespace o80::test {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 /// A request that is always rejected, with a reason.
 struct Refuse {};
@@ -183,6 +189,16 @@ class StartedBackend final : public ManualBackend {
   }
 };
 
+/// A started backend and a frontend of it: `auto [manual, frontend] = StartedPair();`
+struct StartedPair {
+  explicit StartedPair(const BackendOptions& options = {.segment = "pair"},
+                       const std::function<void(Schema&)>& describe = {})
+      : manual(options, describe) {}
+
+  StartedBackend manual;
+  UntypedFrontend frontend{"pair"};
+};
+
 /// A manual backend that serves bursts in a thread of its own.
 class BurstingBackend {
  public:
@@ -246,10 +262,27 @@ inline std::vector<double> desired(const UntypedFrontend& frontend, Iteration fi
   return states;
 }
 
+inline std::vector<JournalEntry> all_of(Journal& journal) {
+  std::vector<JournalEntry> entries;
+  for (JournalEntry entry; journal.next(entry);) entries.push_back(entry);
+  return entries;
+}
+
 /// A test with its own folder of segments.
 class ManualBackendTest : public ::testing::Test {
  protected:
   PrivateDirectory directory_;
+};
+
+/// A started backend, a commander, and a frontend that may only observe.
+class ObservedBackendTest : public ManualBackendTest {
+ protected:
+  explicit ObservedBackendTest(const BackendOptions& options = {.segment = "pair"})
+      : manual(options) {}
+
+  StartedBackend manual;
+  UntypedFrontend commander{"pair"};
+  UntypedFrontend observer{"pair", {.access = Access::read_only}};
 };
 
 }  // namespace o80::test

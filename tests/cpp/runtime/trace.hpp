@@ -84,6 +84,7 @@ class Trace {
 
  private:
   using Statements = std::vector<std::string>;
+  using Verbs = std::map<std::string, std::function<void(UntypedFrontend&)>>;
 
   void play_all(const Statements& statements) {
     for (const std::string& text : statements) {
@@ -96,8 +97,8 @@ class Trace {
     }
   }
   double number(std::size_t i) const { return std::stod(words_.at(i)); }
-  auto whole(std::size_t i) const { return static_cast<std::int64_t>(number(i)); }
-  auto small(std::size_t i) const { return static_cast<std::uint32_t>(number(i)); }
+  std::int64_t whole(std::size_t i) const { return static_cast<std::int64_t>(number(i)); }
+  std::uint32_t small(std::size_t i) const { return static_cast<std::uint32_t>(number(i)); }
   /// Place of a word, or 0.
   std::size_t find(const char* word) const {
     const auto found = std::ranges::find(words_, word);
@@ -147,104 +148,105 @@ class Trace {
     return frontend.pulse(options);
   }
 
-  bool adds(UntypedFrontend& frontend) {
-    const std::string& verb = words_[0];
-    if (words_.size() > 2 && words_[1] == "to") {
-      CommandOptions options;
-      if (find("over") > 0) options.pace = iterations(whole(find("over") + 1));
-      if (find("for") > 0) {
-        options.pace =
-            duration(std::chrono::microseconds(std::lround(1e3 * number(find("for") + 1))));
-      }
-      if (find("until") > 0) options.pace = until(whole(find("until") + 1));
-      if (find("speed") > 0) options.pace = speed(number(find("speed") + 1));
-      if (find("fastest") > 0) options.pace = fastest();
-      if (find("overwrite") > 0) options.mode = Mode::overwrite;
-      std::vector<std::uint32_t> actuators;
-      std::vector<double> targets;
-      std::istringstream each(words_[0]);
-      for (std::string actuator; std::getline(each, actuator, ',');) {
-        actuators.push_back(static_cast<std::uint32_t>(std::stoul(actuator)));
-        targets.push_back(number(1 + actuators.size()));
-      }
-      if (actuators.size() == 1) {
-        add(frontend, actuators[0], targets[0], options);
-      } else {
-        frontend.add_commands(actuators, std::as_bytes(std::span(targets)), options);
-      }
-    } else if (begins("purge own ")) {
-      frontend.add_purge_own();
-    } else if (verb == "purge") {
-      frontend.add_purge(words_.size() > 1 ? small(1) : kEveryActuator);
-    } else if (verb == "take") {
-      frontend.add_take_control();
-    } else if (verb == "release") {
-      frontend.add_release_control();
-    } else if (verb == "note") {
-      frontend.add_mark("a note");
-    } else if (verb == "reset") {
-      add_request(frontend, Reset{.seed = small(1)});
-    } else if (words_.size() > 1 && (words_[1] == "ends" || words_[1] == "progress")) {
-      return false;
-    } else if (verb == "refuse") {
-      add_request<Refuse>(frontend);
-    } else if (verb == "break") {
-      add_request<Break>(frontend);
-    } else if (verb == "snapshot") {
-      add_request<Snapshot>(frontend);
-    } else if (verb == "home") {
-      add_request<Home>(frontend);
-    } else if (verb == "calibrate") {
-      add_request<Calibrate>(frontend);
-    } else {
-      return false;
-    }
+  bool plays(const Verbs& verbs, UntypedFrontend& frontend) {
+    const auto verb = verbs.find(words_[0]);
+    if (verb == verbs.end()) return false;
+    verb->second(frontend);
     return true;
   }
 
-  bool acts(UntypedFrontend& frontend) {
-    const std::string& verb = words_[0];
-    UntypedBackend& backend = manual.backend;
-    if (verb == "run") {
-      manual.run(static_cast<int>(whole(1)));
-    } else if (verb == "drive") {
-      EXPECT_EQ(manual.drive(), Step::standing);
-    } else if (verb == "burst") {
-      frontend.start_burst(whole(1));
-      EXPECT_EQ(manual.drive(), Step::standing);
-    } else if (verb == "cancel") {
-      bursts_.at(words_[1]).cancel();
-    } else if (verb == "cut") {
-      backend.cut_burst();
-    } else if (verb == "missed") {
-      backend.set_timing({.skipped = small(1)});
-    } else if (verb == "read") {
-      manual.now.at(small(1)) = number(2);
-    } else if (verb == "offset") {
-      manual.offset.at(small(1)) = number(2);
-    } else if (verb == "alive") {
-      frontend.keep_alive();
-    } else if (verb == "halt") {
-      frontend.halt(rest(1));
-    } else if (verb == "interrupt") {
-      backend.interrupt(small(1));
-    } else if (begins("driver halts ")) {
-      backend.halt(HaltCause::driver, rest());
-    } else if (begins("end stopped ")) {
-      backend.end(BackendState::stopped);
-    } else if (begins("end failed ")) {
-      backend.end(BackendState::failed, rest());
-    } else if (verb == "stop") {
-      backend.ask_to_stop();
-    } else if (words_.size() > 1 && words_[1] == "progress") {
-      backend.show_progress(frontend.request_index(verb), rest());
-    } else if (words_.size() > 1 && words_[1] == "ends") {
-      backend.end_request(frontend.request_index(verb), how_it_ends());
+  bool adds(UntypedFrontend& frontend) {
+    const std::string second = words_.size() > 1 ? words_[1] : "";
+    if (second == "ends" || second == "progress") return false;
+    if (second != "to" || words_.size() == 2) return plays(adding_, frontend);
+    CommandOptions options;
+    if (find("over") > 0) options.pace = iterations(whole(find("over") + 1));
+    if (find("for") > 0) {
+      options.pace =
+          duration(std::chrono::microseconds(std::lround(1e3 * number(find("for") + 1))));
+    }
+    if (find("until") > 0) options.pace = until(whole(find("until") + 1));
+    if (find("speed") > 0) options.pace = speed(number(find("speed") + 1));
+    if (find("fastest") > 0) options.pace = fastest();
+    if (find("overwrite") > 0) options.mode = Mode::overwrite;
+    std::vector<std::uint32_t> actuators;
+    std::vector<double> targets;
+    std::istringstream each(words_[0]);
+    for (std::string actuator; std::getline(each, actuator, ',');) {
+      actuators.push_back(static_cast<std::uint32_t>(std::stoul(actuator)));
+      targets.push_back(number(1 + actuators.size()));
+    }
+    if (actuators.size() == 1) {
+      add(frontend, actuators[0], targets[0], options);
     } else {
-      return false;
+      frontend.add_commands(actuators, std::as_bytes(std::span(targets)), options);
     }
     return true;
   }
+  const Verbs adding_{
+      {"purge",
+       [this](auto& frontend) {
+         if (begins("purge own ")) {
+           frontend.add_purge_own();
+         } else {
+           frontend.add_purge(words_.size() > 1 ? small(1) : kEveryActuator);
+         }
+       }},
+      {"take", [](auto& frontend) { frontend.add_take_control(); }},
+      {"release", [](auto& frontend) { frontend.add_release_control(); }},
+      {"note", [](auto& frontend) { frontend.add_mark("a note"); }},
+      {"reset", [this](auto& frontend) { add_request(frontend, Reset{.seed = small(1)}); }},
+      {"refuse", [](auto& frontend) { add_request<Refuse>(frontend); }},
+      {"break", [](auto& frontend) { add_request<Break>(frontend); }},
+      {"snapshot", [](auto& frontend) { add_request<Snapshot>(frontend); }},
+      {"home", [](auto& frontend) { add_request<Home>(frontend); }},
+      {"calibrate", [](auto& frontend) { add_request<Calibrate>(frontend); }},
+  };
+
+  bool acts(UntypedFrontend& frontend) {
+    const std::string second = words_.size() > 1 ? words_[1] : "";
+    if (second == "progress") {
+      manual.backend.show_progress(frontend.request_index(words_[0]), rest());
+    } else if (second == "ends") {
+      manual.backend.end_request(frontend.request_index(words_[0]), how_it_ends());
+    } else {
+      return plays(acting_, frontend);
+    }
+    return true;
+  }
+  const Verbs acting_{
+      {"run", [this](auto&) { manual.run(static_cast<int>(whole(1))); }},
+      {"drive", [this](auto&) { EXPECT_EQ(manual.drive(), Step::standing); }},
+      {"burst",
+       [this](auto& frontend) {
+         frontend.start_burst(whole(1));
+         EXPECT_EQ(manual.drive(), Step::standing);
+       }},
+      {"cancel", [this](auto&) { bursts_.at(words_[1]).cancel(); }},
+      {"cut", [this](auto&) { manual.backend.cut_burst(); }},
+      {"missed", [this](auto&) { manual.backend.set_timing({.skipped = small(1)}); }},
+      {"read", [this](auto&) { manual.now.at(small(1)) = number(2); }},
+      {"offset", [this](auto&) { manual.offset.at(small(1)) = number(2); }},
+      {"alive", [](auto& frontend) { frontend.keep_alive(); }},
+      {"halt", [this](auto& frontend) { frontend.halt(rest(1)); }},
+      {"interrupt", [this](auto&) { manual.backend.interrupt(small(1)); }},
+      {"driver", [this](auto&) { manual.backend.halt(HaltCause::driver, rest()); }},
+      {"end",
+       [this](auto&) {
+         const bool fails = words_.at(1) == "failed";
+         manual.backend.end(fails ? BackendState::failed : BackendState::stopped, rest());
+       }},
+      {"stop", [this](auto&) { manual.backend.ask_to_stop(); }},
+      {"last", [this](auto& frontend) { EXPECT_EQ(frontend.published(), whole(1)); }},
+      {"running", [](auto& frontend) { EXPECT_FALSE(frontend.halted()); }},
+      {"halted", [this](auto& frontend) { expect_halt(frontend.halted()); }},
+      {"homed", [this](auto&) { EXPECT_EQ(manual.homed, whole(1)); }},
+      {"fresh", [this](auto&) { EXPECT_EQ(manual.fresh_starts, whole(2)); }},
+      {"ends", [this](auto&) { EXPECT_EQ(manual.iterate(), Step::ended); }},
+      {"brakes", [this](auto&) { EXPECT_EQ(manual.backend.brake(), Step::run); }},
+      {"fails",
+       [this](auto&) { EXPECT_THAT(std::string(manual.backend.failure()), HasSubstr(rest(1))); }},
+  };
   Served how_it_ends() const {
     if (find("afresh") > 0) return Served::start_afresh();
     if (find("rejected") > 0) return Served::rejected(rest(3));
@@ -265,26 +267,10 @@ class Trace {
       const RowHead head = frontend.wait_for(whole(1), kAtOnce).head();
       EXPECT_EQ(head.fresh != 0, find("fresh") > 0);
       EXPECT_EQ(head.halted != 0, find("halted") > 0);
-    } else if (what == "last") {
-      EXPECT_EQ(frontend.published(), whole(1));
-    } else if (what == "running") {
-      EXPECT_FALSE(frontend.halted());
-    } else if (what == "halted") {
-      expect_halt(frontend.halted());
     } else if (what == "runs") {
       std::string names;
       for (const auto& each : frontend.running_requests()) names += " " + each.name;
       EXPECT_EQ(what + names, rest(0));
-    } else if (what == "homed") {
-      EXPECT_EQ(manual.homed, whole(1));
-    } else if (begins("fresh starts ")) {
-      EXPECT_EQ(manual.fresh_starts, whole(2));
-    } else if (what == "ends") {
-      EXPECT_EQ(manual.iterate(), Step::ended);
-    } else if (what == "brakes") {
-      EXPECT_EQ(manual.backend.brake(), Step::run);
-    } else if (what == "fails") {
-      EXPECT_THAT(std::string(manual.backend.failure()), ::testing::HasSubstr(rest(1)));
     } else if (what == "journal") {
       std::string entries;
       for (JournalEntry entry; journal_->next(entry);) entries += " " + text_of(entry);
@@ -307,7 +293,7 @@ class Trace {
     if (is_one_of(taken, scheduled, rejected, resume, control_taken, control_released, silent,
                   burst, burst_ended) ||
         entry.cause == HaltCause::frontend) {
-      EXPECT_THAT(entry.who, ::testing::HasSubstr("pid " + std::to_string(getpid()))) << text;
+      EXPECT_THAT(entry.who, HasSubstr("pid " + std::to_string(getpid()))) << text;
     }
     return text + "@" + std::to_string(entry.iteration);
   }
@@ -335,13 +321,13 @@ class Trace {
     } else if (verb == "undone") {
       EXPECT_FALSE(bursts_.at(words_[0]).done());
     } else if (verb == "says") {
-      EXPECT_THAT(handle.text, ::testing::HasSubstr(rest()));
+      EXPECT_THAT(handle.text, HasSubstr(rest()));
     } else if (verb == "shows") {
       EXPECT_EQ(handle.progress, rest());
     } else if (verb == "waits" && words_.size() == 2) {
       wait();
     } else if (verb == "waits") {
-      EXPECT_THAT(message_of<NotCompleted>(wait), ::testing::HasSubstr(rest()));
+      EXPECT_THAT(message_of<NotCompleted>(wait), HasSubstr(rest()));
     } else if (verb == "raises") {
       expect_error(words_.at(2), wait);
     } else {
@@ -351,7 +337,7 @@ class Trace {
   }
   template <class Call>
   void expect_error(const std::string& type, const Call& call) {
-    const auto text = ::testing::HasSubstr(rest(3));
+    const auto text = HasSubstr(rest(3));
     if (type == "BackendHalted") {
       EXPECT_THAT(message_of<BackendHalted>(call), text);
     } else if (type == "BackendStopped") {
@@ -386,5 +372,8 @@ inline void play(const BackendOptions& options, const std::string& script,
   Trace(options, describe).play(script);
 }
 inline void play(const std::string& script) { play({.segment = "pair"}, script); }
+inline void play_bursts(const std::string& script) {
+  play({.segment = "pair", .bursting = true}, script);
+}
 
 }  // namespace o80::test

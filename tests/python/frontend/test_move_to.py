@@ -44,6 +44,7 @@ def joints(segment: str) -> Iterator[o80.Frontend]:
         yield frontend
 
 
+# rule S5
 def test_says_where_the_robot_is(segment: str) -> None:
     named, targets = ["joints_0", "joints_1"], [0.5, {"position": 0.005}]
     with (

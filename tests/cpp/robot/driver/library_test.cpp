@@ -13,8 +13,6 @@ namespace o80::test {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 
 class LibraryTest : public ManualBackendTest {
  protected:
@@ -25,10 +23,6 @@ TEST_F(LibraryTest, LoadsABundledRobotByName) {
   const RobotLibrary library = RobotLibrary::load("two_joints");
   EXPECT_STREQ(library.table->name, "two_joints");
   EXPECT_TRUE(fs::equivalent(library.path, kTwoJoints)) << library.path;
-}
-
-TEST_F(LibraryTest, LoadsARobotByPath) {
-  EXPECT_STREQ(RobotLibrary::load(kTwoJoints).table->name, "two_joints");
 }
 
 TEST_F(LibraryTest, FindsRobotsInThePathFirst) {

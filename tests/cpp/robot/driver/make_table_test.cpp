@@ -3,13 +3,9 @@
 #include "robot/driver/driver_instance.hpp"
 #include "robot/fake_driver.hpp"
 #include "robot/inline_simulation.hpp"
-#include "robot/loop/loop.hpp"
 
 namespace o80::test {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 
 class MakeTableTest : public FakeDriverTest {};
 
@@ -70,22 +66,6 @@ struct TickingSensor : Sensor {
 
 static_assert(Driver<TickingSensor> && Driver<FakeDriver> && Driver<Sensor> && Driver<Model>);
 
-TEST_F(MakeTableTest, ListsTheOptionsOfTheConfig) {
-  const std::vector<Option> options = options_of(table());
-  ASSERT_EQ(options.size(), 3U);
-  EXPECT_THAT(options[0].kind, HasSubstr("never, construct"));
-  EXPECT_EQ(options[1].name, "gain");
-  EXPECT_EQ(options[1].unit, "1/s");
-}
-
-TEST_F(MakeTableTest, DescribesTheDriverAcrossTheTable) {
-  DriverInstance robot(table(), {});
-  const Schema schema = robot.describe();
-  EXPECT_EQ(schema.head.robot.view(), "fake");
-  EXPECT_EQ(schema.actuators[1].name.view(), "right");
-  EXPECT_EQ(schema.requests[0].name.view(), "poke");
-}
-
 TEST_F(MakeTableTest, ARobotWithAPeriodOfItsOwnRunsAtItOrIsNotStarted) {
   const auto period_of = [](std::int64_t requested) {
     return InlineSimulation("ticking", *robot_table<TickingSensor>("ticking"), {}, requested)
@@ -103,17 +83,6 @@ TEST_F(MakeTableTest, ARobotWithAPeriodOfItsOwnRunsAtItOrIsNotStarted) {
 TEST_F(MakeTableTest, ARobotOfAnyPeriodRunsAtOneKilohertzUnlessAskedOtherwise) {
   InlineSimulation sensor("sensor", *robot_table<Sensor>("sensor"), {}, 0);
   EXPECT_EQ(sensor.frontend.period(), 1'000'000);
-}
-
-TEST_F(MakeTableTest, NothingThatADriverThrowsCrossesTheTable) {
-  EXPECT_THAT(message_of<DriverError>([] { DriverInstance(table(), {{"fails", "construct"}}); }),
-              AllOf(HasSubstr("'fake'"), HasSubstr("no cable")));
-  EXPECT_THAT(
-      message_of<DriverError>([] { DriverInstance(table(), {{"fails", "describe"}}).describe(); }),
-      HasSubstr("no plan"));
-  DriverInstance robot(table(), {{"fails", "start"}});
-  EXPECT_FALSE(robot.start());
-  EXPECT_STREQ(robot.fault(), "no power");
 }
 
 TEST_F(MakeTableTest, ADriverIsStoppedOnceAndOnlyIfAStartWasTried) {
@@ -139,33 +108,18 @@ TEST_F(MakeTableTest, ATableOfAnotherVersionIsRefusedWithTheCure) {
 }
 
 TEST_F(MakeTableTest, APureSensorIsADriverToo) {
-  Loop loop(std::make_unique<DriverInstance>(*robot_table<Sensor>("sensor"), OptionValues{}),
-            {.segment = "sensor", .bursting = true});
-  loop.start();
-  UntypedFrontend frontend("sensor");
-  frontend.start_burst(4);
-  EXPECT_EQ(loop.run_granted(kAll), Step::standing);
-  EXPECT_EQ(unpack<double>(frontend.latest().extended()), 4.0);
+  InlineSimulation sensor("sensor", *robot_table<Sensor>("sensor"), {}, 0);
+  EXPECT_EQ(unpack<double>(sensor.burst(4).extended()), 4.0);
 }
 
 TEST_F(MakeTableTest, ADriverMayKnowItsLayoutAtRunTimeOnly) {
-  Loop loop(
-      std::make_unique<DriverInstance>(*robot_table<Model>("model"), OptionValues{{"joints", "2"}}),
-      {.segment = "model", .bursting = true});
-  loop.start();
-  UntypedFrontend frontend("model");
+  InlineSimulation model("model", *robot_table<Model>("model"), {{"joints", "2"}}, 0);
+  UntypedFrontend& frontend = model.frontend;
   ASSERT_EQ(frontend.schema().actuators.size(), 2U);
   EXPECT_EQ(unpack<double>(frontend.latest().desired() + 16), 0.5);
-  struct State {
-    double position = 2.5;
-    float gain = 0;
-    float padding = 0;
-  };
-  const State target;
-  frontend.add_command(1, std::as_bytes(std::span(&target, 1)));
-  frontend.start_burst(2);
-  EXPECT_EQ(loop.run_granted(kAll), Step::standing);
-  const UntypedObservation row = frontend.latest();
+  const std::array target{2.5, 0.0};  // position and gain
+  frontend.add_command(1, std::as_bytes(std::span(target)));
+  const UntypedObservation row = model.burst(2);
   EXPECT_EQ(unpack<double>(row.observed() + 16), 2.5);
   EXPECT_EQ(unpack<std::int64_t>(row.extended()), 2);
 }

@@ -10,17 +10,18 @@
 #include "memory/child_process.hpp"
 #include "o80/memory/segment_list.hpp"
 #include "robot/fake_simulator.hpp"
-#include "runtime/frontend/link.hpp"
 
 namespace o80::test {
 namespace {
 
-using ::testing::HasSubstr;
-
 class InlineGroupTest : public ManualBackendTest {
  protected:
-  static InlineGroup::Options group_of(std::size_t copies, std::size_t threads = 2) {
-    return {.copies = copies, .threads = threads, .backend = InlineGroup::default_options()};
+  static InlineGroup::Options group_of(std::size_t copies, std::size_t threads = 2,
+                                       const InlineGroup* sharing = nullptr) {
+    return {.copies = copies,
+            .threads = threads,
+            .sharing = sharing,
+            .backend = InlineGroup::default_options()};
   }
 };
 
@@ -29,11 +30,8 @@ std::vector<std::byte> dawdle(std::size_t copies) {
 }
 
 std::size_t open_files() {
-  std::size_t count = 0;
-  for ([[maybe_unused]] const auto& each : std::filesystem::directory_iterator("/proc/self/fd")) {
-    ++count;
-  }
-  return count;
+  const std::filesystem::directory_iterator files("/proc/self/fd");
+  return static_cast<std::size_t>(std::distance(begin(files), end(files)));
 }
 
 TEST_F(InlineGroupTest, SendsNoBatchForTargetsOfEachIterationUnlessAJournalNeedsIt) {
@@ -57,9 +55,7 @@ TEST_F(InlineGroupTest, SendsNoBatchForTargetsOfEachIterationUnlessAJournalNeeds
 
 TEST_F(InlineGroupTest, IsFollowedByAnotherGroupCopyByCopyInTheSameCall) {
   InlineGroup leader(fake(), {}, group_of(9, 3));
-  InlineGroup::Options sharing = group_of(9);
-  sharing.sharing = &leader;
-  InlineGroup follower(fake(), {}, sharing);
+  InlineGroup follower(fake(), {}, group_of(9, 2, &leader));
   InlineGroup first(fake(), {}, group_of(9, 1));
   InlineGroup second(fake(), {}, group_of(9, 1));
   GroupBurst leading(leader, 2, 1, 4), following(follower, 2, 4, 4);
@@ -172,35 +168,32 @@ TEST_F(InlineGroupTest, EndsBetweenTwoIterationsWhenItsCallerSaysSoOrThrowsOrHas
   expect_end_between_iterations<TimeoutError>(late, std::chrono::milliseconds(60), {});
 }
 
-TEST_F(InlineGroupTest, LeavesTheOthersTheirCallWhenOneThreadUsesIt) {
-  InlineGroup group(fake(), {}, group_of(2));
-  std::vector<std::uint32_t> all{0, 1};
-  GroupBurst burst(group, 2, 1, 4);
-  std::string said;
-  const auto nested = [&] {
-    said = message_of<Error>([&] { burst.run(); });
-    return false;
-  };
-  EXPECT_THROW(group.request(3, all, dawdle(2), kPatience, nested), Cancelled);
-  EXPECT_THAT(said, HasSubstr("call it from one thread at a time"));
-  burst.run();
-}
-
-TEST_F(InlineGroupTest, SharesItsThreadsInTurn) {
-  InlineGroup leader(fake(), {}, group_of(2));
-  InlineGroup::Options sharing = group_of(3);
-  sharing.sharing = &leader;
-  InlineGroup follower(fake(), {}, sharing);
-  GroupBurst burst(follower, 2, 1, 4);
-  EXPECT_EQ(follower.threads(), 2U);
+/// What a burst says within a request of a group of two.
+std::string said_within_a_request(InlineGroup& group, GroupBurst& burst) {
   const std::vector<std::uint32_t> all{0, 1};
   std::string said;
   const auto nested = [&] {
     said = message_of<Error>([&] { burst.run(); });
     return false;
   };
-  EXPECT_THROW(leader.request(3, all, dawdle(2), kPatience, nested), Cancelled);
-  EXPECT_THAT(said, HasSubstr("shares them with: call one after the other"));
+  EXPECT_THROW(group.request(3, all, dawdle(2), kPatience, nested), Cancelled);
+  return said;
+}
+
+TEST_F(InlineGroupTest, LeavesTheOthersTheirCallWhenOneThreadUsesIt) {
+  InlineGroup group(fake(), {}, group_of(2));
+  GroupBurst burst(group, 2, 1, 4);
+  EXPECT_THAT(said_within_a_request(group, burst), HasSubstr("call it from one thread at a time"));
+  burst.run();
+}
+
+TEST_F(InlineGroupTest, SharesItsThreadsInTurn) {
+  InlineGroup leader(fake(), {}, group_of(2));
+  InlineGroup follower(fake(), {}, group_of(3, 2, &leader));
+  GroupBurst burst(follower, 2, 1, 4);
+  EXPECT_EQ(follower.threads(), 2U);
+  EXPECT_THAT(said_within_a_request(leader, burst),
+              HasSubstr("shares them with: call one after the other"));
   leader.close();
   burst.run();
   EXPECT_EQ(burst.last_iteration(2), 4);
@@ -222,46 +215,6 @@ TEST_F(InlineGroupTest, ServesRequestsWithAPayloadForEachCopy) {
   EXPECT_THAT(message_of<CopyFailed>([&] { group.request(2, one, slot, kPatience); }),
               HasSubstr("copy 1 of 'fake' failed: request 'restore' was not completed: nothing "
                         "was saved there"));
-}
-
-TEST_F(InlineGroupTest, GathersObservationsAndFlagsOfTheNewestRows) {
-  InlineGroup group(fake(), {}, group_of(3));
-  const RowLayout& layout = group.description().layout;
-  const RowGather wanted{
-      .numbers = {{.from = {layout.observed, Kind::float64}, .offset = 0.5, .scale = 2},
-                  {.from = {layout.observed + 8, Kind::float64}, .low = -0.25, .high = 0.25},
-                  {.from = {layout.extended + 8, Kind::int32}}},
-      .flags = {{.from = {layout.extended + 12, Kind::uint8}, .value = 0},
-                {.from = {layout.extended + 8, Kind::int32},
-                 .compare = EventFlag::Compare::greater_equal,
-                 .value = 4}}};
-  std::vector<float> observations(9, -1);
-  std::vector<std::uint8_t> flags(6, 9);
-  group.gather(wanted, {observations, flags});
-  const auto expect = [&](std::size_t copy) {
-    const UntypedObservation row = group.attach(copy)->latest();
-    const auto left = unpack<double>(row.observed());
-    const auto right = unpack<double>(row.observed() + 8);
-    const auto count = unpack<std::int32_t>(row.extended() + 8);
-    EXPECT_EQ(observations[copy * 3], static_cast<float>((left - 0.5) * 2));
-    EXPECT_EQ(observations[copy * 3 + 1], static_cast<float>(std::clamp(right, -0.25, 0.25)));
-    EXPECT_EQ(observations[copy * 3 + 2], static_cast<float>(count));
-    EXPECT_EQ(flags[copy * 2], count % 2);
-    EXPECT_EQ(flags[copy * 2 + 1], count >= 4 ? 1 : 0);
-  };
-  for (std::size_t copy = 0; copy < 3; ++copy) expect(copy);
-  GroupBurst burst(group, 2, 1, 3);
-  for (double& target : burst.targets) target = 1;
-  for (const std::vector<std::uint32_t>& chosen :
-       {std::vector<std::uint32_t>{0, 1, 2}, std::vector<std::uint32_t>{1}}) {
-    group.burst(burst.plan, chosen, kPatience);
-    for (std::size_t copy = 0; copy < 3; ++copy) expect(copy);
-  }
-  EXPECT_EQ(flags[3], 1);
-  const std::vector<std::uint32_t> one{1};
-  group.request(0, one, std::vector<std::byte>(sizeof(Reset)), kPatience);
-  for (std::size_t copy = 0; copy < 3; ++copy) expect(copy);
-  EXPECT_EQ(flags[3], 0);
 }
 
 TEST_F(InlineGroupTest, RefusesMemoryOfAnotherSizeAndMoreRowsThanTheHistoryHas) {
@@ -424,9 +377,7 @@ void expect_close_during(RunBurst&& burst, Close&& close) {
 TEST_F(InlineGroupTest, IsClosedInASignalHandlerOfItsCallWhichDoesNotWaitForItself) {
   const RobotTable& robot = *robot_table<Gated>("gated");
   InlineGroup leader(robot, {}, group_of(2));
-  InlineGroup::Options sharing = group_of(2);
-  sharing.sharing = &leader;
-  InlineGroup follower(robot, {}, sharing);
+  InlineGroup follower(robot, {}, group_of(2, 2, &leader));
   GroupBurst leading(leader, 1, 1, 1), following(follower, 1, 1, 1);
   const InlineGroup::Following then{&follower, &following.plan, {}};
   leading.plan.then = &then;

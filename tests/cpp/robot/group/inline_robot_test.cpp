@@ -7,10 +7,11 @@
 namespace o80::test {
 namespace {
 
-using ::testing::HasSubstr;
-
 class InlineRobotTest : public FakeDriverTest {};
 
+std::shared_ptr<InlineRobot> here(std::unique_ptr<DriverInstance> driver) {
+  return std::make_shared<InlineRobot>(std::move(driver), BackendOptions{.segment = "here"});
+}
 std::unique_ptr<DriverInstance> two_joints() {
   static const RobotLibrary library = RobotLibrary::load(kTwoJoints);
   return std::make_unique<DriverInstance>(*library.table, OptionValues{{"gain", "30"}});
@@ -39,16 +40,14 @@ TEST_F(InlineRobotTest, GivesTheSameRowsBitForBitAsABurstingProcess) {
   process.signal(SIGTERM);
   EXPECT_EQ(process.end().code, 0);
 
-  const auto robot = std::make_shared<InlineRobot>(two_joints(), BackendOptions{.segment = "here"});
-  UntypedFrontend here("here", robot);
-  const std::vector<std::byte> again = play(here);
+  UntypedFrontend own("here", here(two_joints()));
+  const std::vector<std::byte> again = play(own);
   ASSERT_GT(rows.size(), 0U);
   EXPECT_EQ(again, rows);
 }
 
 TEST_F(InlineRobotTest, LetsOthersWatchAndCommand) {
-  const auto robot = std::make_shared<InlineRobot>(two_joints(), BackendOptions{.segment = "here"});
-  UntypedFrontend owner("here", robot);
+  UntypedFrontend owner("here", here(two_joints()));
   UntypedFrontend other("here");
   const Batch theirs = send(other, 1, 1.0);
   owner.burst(1, kAtOnce);
@@ -69,9 +68,7 @@ TEST_F(InlineRobotTest, LeavesTheRestOfABurstThatItsCallerCuts) {
 }
 
 TEST_F(InlineRobotTest, LeavesTheHardwareToTheParentOfAForkedChild) {
-  auto loop = std::make_unique<Loop>(std::make_unique<DriverInstance>(table(), OptionValues{}),
-                                     BackendOptions{.segment = "here", .bursting = true});
-  loop->start();
+  auto loop = started();
   const pid_t child = fork();
   if (child == 0) {
     loop.reset();
@@ -80,12 +77,11 @@ TEST_F(InlineRobotTest, LeavesTheHardwareToTheParentOfAForkedChild) {
   int status = -1;
   ASSERT_EQ(waitpid(child, &status, 0), child);
   EXPECT_EQ(WEXITSTATUS(status), 0);
-  EXPECT_EQ(UntypedFrontend("here").life(), Life::running);
+  EXPECT_EQ(UntypedFrontend("fake").life(), Life::running);
 }
 
 TEST_F(InlineRobotTest, WaitsForNothingOfItsOwn) {
-  const auto robot = std::make_shared<InlineRobot>(two_joints(), BackendOptions{.segment = "here"});
-  UntypedFrontend frontend("here", robot);
+  UntypedFrontend frontend("here", here(two_joints()));
   add(frontend, 0, 1.0, {.pace = iterations(100)});
   EXPECT_EQ(frontend.pulse_and_wait(kAtOnce).iteration(), 100);
   EXPECT_EQ(frontend.burst(5, kAtOnce).iteration(), 105);
@@ -96,26 +92,12 @@ TEST_F(InlineRobotTest, WaitsForNothingOfItsOwn) {
 }
 
 TEST_F(InlineRobotTest, RaisesAFaultWhereItWasBurst) {
-  const auto robot = std::make_shared<InlineRobot>(
-      std::make_unique<DriverInstance>(table(), OptionValues{{"fails", "write"}}),
-      BackendOptions{.segment = "here"});
-  UntypedFrontend frontend("here", robot);
+  UntypedFrontend frontend("here", here(driver({{"fails", "write"}})));
   EXPECT_THAT(message_of<DriverError>([&] { frontend.burst(10, kPatience); }),
               HasSubstr("wire cut"));
   EXPECT_EQ(FakeDriver::calls.stopped, 1);
   EXPECT_THROW(frontend.burst(1, kPatience), BackendFailed);
   EXPECT_EQ(frontend.published(), 2);
-}
-
-TEST_F(InlineRobotTest, StopsWhenToldAndItsFrontendsSeeIt) {
-  const auto robot = std::make_shared<InlineRobot>(
-      std::make_unique<DriverInstance>(table(), OptionValues{}), BackendOptions{.segment = "here"});
-  UntypedFrontend frontend("here", robot);
-  frontend.burst(2, kAtOnce);
-  robot->stop();
-  EXPECT_EQ(FakeDriver::calls.stopped, 1);
-  EXPECT_THROW(frontend.burst(1, kPatience), BackendStopped);
-  EXPECT_EQ(frontend.latest().iteration(), 2);
 }
 
 TEST_F(InlineRobotTest, NamesThatNobodyUsesDiffer) {
@@ -164,10 +146,9 @@ O80_DESCRIBE(Summing::Config);
 O80_DESCRIBE(Summing::Joint, angle, on);
 
 TEST_F(InlineRobotTest, GivesADriverTheRatesOfItsDesiredStates) {
-  const auto robot = std::make_shared<InlineRobot>(
-      std::make_unique<DriverInstance>(*robot_table<Summing>("summing"), OptionValues{}),
-      BackendOptions{.segment = "here"});
-  Frontend<Summing> frontend("here", robot);
+  const RobotTable& summing = *robot_table<Summing>("summing");
+  Frontend<Summing> frontend("here",
+                             here(std::make_unique<DriverInstance>(summing, OptionValues{})));
   frontend.add_command(0, Summing::Joint{0.3, false});
   frontend.add_command(1, Summing::Joint{1.0, true}, {.pace = iterations(40)});
   frontend.burst(60, kPatience);

@@ -1,7 +1,5 @@
 // How a loop halts, resumes and stops in order, with a driver that can fail in each of its verbs.
 
-#include <gmock/gmock.h>
-
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -10,50 +8,21 @@
 
 #include "cases.hpp"
 #include "dice.hpp"
-#include "memory/segment/verb_word.hpp"
 #include "robot/fake_driver.hpp"
-#include "robot/loop/loop.hpp"
 
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-
 class LoopHaltTest : public FakeDriverTest {
  protected:
-  static std::unique_ptr<Loop> bursting_loop(const OptionValues& options = {}) {
-    auto loop = std::make_unique<Loop>(std::make_unique<DriverInstance>(table(), options),
-                                       BackendOptions{.segment = "fake", .bursting = true});
-    loop->start();
-    return loop;
-  }
-  static Loop timed_loop() {
-    return {std::make_unique<DriverInstance>(table(), OptionValues{}),
-            BackendOptions{.segment = "fake", .period = 100'000}};
+  static Loop timed_loop(const OptionValues& options = {}) {
+    return {driver(options), {.segment = "fake", .period = 100'000}};
   }
 };
 
-TEST_F(LoopHaltTest, ADriverHaltsWithItsReading) {
-  const auto loop = bursting_loop();
-  FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
-    if (reading.iteration() >= 3) reading.halt("the belt slipped");
-  };
-  UntypedFrontend frontend("fake");
-  add(frontend, 0, 10.0, {.pace = iterations(10)});
-  frontend.start_burst(10);
-  EXPECT_EQ(loop->run_granted(kAll), Step::standing);
-  EXPECT_EQ(frontend.published(), 3);
-  ASSERT_TRUE(frontend.halted());
-  EXPECT_EQ(frontend.halted()->cause, HaltCause::driver);
-  EXPECT_EQ(frontend.halted()->number, 1U);
-  EXPECT_EQ(frontend.halted()->reason(), "the belt slipped");
-  EXPECT_EQ(FakeDriver::calls.halted, 1) << "the driver is told that a halt begins";
-}
-
 // rule H10
 TEST_F(LoopHaltTest, ADriverMayRefuseToResume) {
-  const auto loop = bursting_loop();
+  const auto loop = started();
   UntypedFrontend frontend("fake");
   const std::uint64_t number = frontend.halt("");
   loop->run_granted(kAll);
@@ -74,7 +43,7 @@ TEST_F(LoopHaltTest, ADriverMayRefuseToResume) {
 }
 
 TEST_F(LoopHaltTest, ADriverThatFailsToHaltEndsTheLoop) {
-  const auto loop = bursting_loop({{"fails", "halt"}});
+  const auto loop = started({{"fails", "halt"}});
   UntypedFrontend frontend("fake");
   frontend.halt("");
   EXPECT_EQ(loop->run_granted(kAll), Step::ended);
@@ -89,20 +58,19 @@ TEST_F(LoopHaltTest, AFirstReadingThatIsNoNumberIsAFaultThatNamesIt) {
   FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
     reading.observed[1] = std::numeric_limits<double>::quiet_NaN();
   };
-  EXPECT_THAT(message_of<DriverError>([] { bursting_loop(); }),
+  EXPECT_THAT(message_of<DriverError>([] { started(); }),
               AllOf(HasSubstr("actuator 'right'"), HasSubstr("is NaN or infinite")));
   EXPECT_EQ(FakeDriver::calls.stopped, 1);
 }
 
 // rule R7
 TEST_F(LoopHaltTest, SoIsOneOfAFreshStart) {
-  const auto loop = bursting_loop();
+  const auto loop = started();
   UntypedFrontend frontend("fake");
   FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
     if (reading.fresh()) reading.observed[0] = std::numeric_limits<double>::infinity();
   };
-  add_request(frontend, Poke{.how = 2});
-  frontend.pulse();
+  poke(frontend, 2);
   EXPECT_EQ(loop->run_granted(kAll), Step::ended);
   EXPECT_THAT(loop->fault(), HasSubstr("actuator 'left'"));
 }
@@ -175,35 +143,12 @@ TEST_F(LoopHaltTest, BrakingThatTakesTooLongIsCut) {
 // rule H13
 TEST_F(LoopHaltTest, AFailedVerbLeavesNoTimeForBraking) {
   FakeDriver::limits = {.speed = 1000.0, .acceleration = 1.0};
-  Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{{"fails", "write"}}),
-            BackendOptions{.segment = "fake", .period = 100'000});
+  Loop loop = timed_loop({{"fails", "write"}});
   loop.start();
   const int before = FakeDriver::calls.written;
   EXPECT_FALSE(loop.run().in_order);
   EXPECT_EQ(FakeDriver::calls.written - before, 3);
   EXPECT_EQ(FakeDriver::calls.stopped, 1);
-}
-
-// ------------------------------------------------------------------------------ verbs that hang
-
-TEST_F(LoopHaltTest, AVerbThatDoesNotReturnIsSeenFromOutside) {
-  std::atomic<bool> hangs{true};
-  FakeDriver::on_write = [&](const Desired<FakeDriver>& desired) {
-    while (desired.iteration() == 2 && hangs) std::this_thread::yield();
-  };
-  Loop loop = timed_loop();
-  loop.start();
-  std::thread runner([&] { static_cast<void>(loop.run()); });
-  const AttachedSegment observer =
-      AttachedSegment::attach("fake", Access::read_only, Deadline(kPatience));
-  SlowVerb slow;
-  while (slow.verb != Verb::write || monotonic_now() - slow.since < 50'000'000) {
-    slow = slow_verb(observer.view());
-  }
-  EXPECT_EQ(to_text(slow.verb), "write");
-  hangs = false;
-  loop.ask_to_stop();
-  runner.join();
 }
 
 // ------------------------------------------------------------------------- readings
@@ -219,7 +164,7 @@ class ReadingTest : public LoopHaltTest {
     FakeDriver::on_read = [this](Reading<FakeDriver>& reading) {
       reading.observed[0] += moved_ + offset_ + (reading.fresh() ? fresh_offset_ : 0.0);
     };
-    loop_ = bursting_loop();
+    loop_ = started();
     frontend_ = std::make_unique<UntypedFrontend>("fake");
   }
   void run(int iterations) {
@@ -359,9 +304,8 @@ TEST_F(ReadingTest, RowZeroInRealTimeIsReadUntilTwoReadingsAgree) {
       if (reads++ == 0 || every != 0.0) reading.observed[0] = 7.0 + every * reads;
     };
     reads = 0;
-    Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{}),
-              BackendOptions{.segment = "fake", .period = 100'000, .accept_reading = accepts});
-    loop.start();
+    const auto loop =
+        started({}, {.segment = "fake", .period = 100'000, .accept_reading = accepts});
     return UntypedFrontend("fake").latest().iteration();
   };
   EXPECT_EQ(start(0.0, false), 0);
@@ -386,14 +330,12 @@ class GapTest : public LoopHaltTest {
     FakeDriver::on_write = [&](const Desired<FakeDriver>& desired) {
       if (desired.iteration() == 20) stall();
     };
-    Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{}),
-              BackendOptions{.segment = "fake", .period = 1'000'000, .gap = gap});
-    loop.start();
-    std::thread runner([&] { static_cast<void>(loop.run()); });
+    const auto loop = started({}, {.segment = "fake", .period = 1'000'000, .gap = gap});
+    std::thread runner([&] { static_cast<void>(loop->run()); });
     UntypedFrontend frontend("fake");
     const Iteration later = frontend.wait_for(25, kPatience).iteration();
     const auto halt = frontend.halted();
-    loop.ask_to_stop();
+    loop->ask_to_stop();
     runner.join();
     EXPECT_GE(later, 25);
     return halt ? std::string(halt->reason()) : "";

@@ -1,7 +1,5 @@
 #include "robot/loop/loop_options.hpp"
 
-#include <gmock/gmock.h>
-
 #include <cstring>
 #include <string>
 
@@ -10,7 +8,6 @@
 namespace o80::test {
 namespace {
 
-using ::testing::HasSubstr;
 using OptionKind = LoopOption::Kind;
 
 /// Whether an option may have this text.

@@ -12,21 +12,14 @@
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 using ::testing::Pair;
 
 class LoopTest : public FakeDriverTest {
  protected:
-  static std::unique_ptr<Loop> make(const OptionValues& options = {}, bool bursting = true) {
-    return std::make_unique<Loop>(
-        std::make_unique<DriverInstance>(table(), options),
-        BackendOptions{.segment = "fake", .period = 200'000, .bursting = bursting});
-  }
-  static std::unique_ptr<Loop> started(const OptionValues& options = {}, bool bursting = true) {
-    auto loop = make(options, bursting);
-    loop->start();
-    return loop;
+  static constexpr std::int64_t kPeriod = 200'000;  // [ns]
+
+  static BackendOptions in(bool bursting) {
+    return {.segment = "fake", .period = kPeriod, .bursting = bursting};
   }
   /// When waiting readers expect the next row [ns]; 0: unknown.
   static std::int64_t next_row_at() {
@@ -38,10 +31,10 @@ class LoopTest : public FakeDriverTest {
 };
 
 TEST_F(LoopTest, StartsThenReadsThenIsRunning) {
-  const auto loop = make();
+  Loop loop(driver(), in(true));
   EXPECT_EQ(FakeDriver::calls.started, 0) << "the name is taken before the hardware is touched";
   EXPECT_THROW(UntypedFrontend("fake", {.timeout = kAtOnce}), TimeoutError);
-  loop->start();
+  loop.start();
   EXPECT_EQ(FakeDriver::calls.started, 1);
   EXPECT_EQ(FakeDriver::calls.read, 1);
   EXPECT_EQ(FakeDriver::calls.written, 0);
@@ -49,7 +42,7 @@ TEST_F(LoopTest, StartsThenReadsThenIsRunning) {
 }
 
 TEST_F(LoopTest, WritesAndReadsOnceAnIteration) {
-  const auto loop = started();
+  const auto loop = started({}, in(true));
   UntypedFrontend frontend("fake");
   add(frontend, 1, 4.0, {.pace = iterations(4)});
   frontend.start_burst(5);
@@ -58,7 +51,7 @@ TEST_F(LoopTest, WritesAndReadsOnceAnIteration) {
     written.push_back(desired.iteration());
     EXPECT_EQ(desired.active(1), desired.iteration() <= 4);
     EXPECT_FALSE(desired.active(0));
-    EXPECT_EQ(desired.time(), desired.iteration() * 200'000);
+    EXPECT_EQ(desired.time(), desired.iteration() * kPeriod);
     EXPECT_DOUBLE_EQ(desired.period(), 2e-4);
   };
   EXPECT_EQ(loop->run_granted(kAll), Step::standing);
@@ -105,7 +98,7 @@ TEST_P(ForkingLoop, EndsTheChildWhichTouchesNothing) {
   FakeDriver::on_read = [&](Reading<FakeDriver>& reading) {
     if (!writes || child_ == 0) fork_at(reading.iteration());
   };
-  const auto loop = started({{"finish_at", "4"}}, bursting);
+  const auto loop = started({{"finish_at", "4"}}, in(bursting));
   UntypedFrontend frontend("fake");
   if (bursting) frontend.start_burst(4);
   EXPECT_TRUE(loop->run().in_order);
@@ -125,7 +118,7 @@ class LoopFails : public LoopTest,
 
 TEST_P(LoopFails, OnTheWayAndSaysSoInTheSegmentAndStopsItsDriverOnce) {
   const auto [fails, why] = GetParam();
-  auto loop = make({{"fails", fails}});
+  auto loop = std::make_unique<Loop>(driver({{"fails", fails}}), in(true));
   std::thread waiter([why] {
     // whoever waits to attach raises it
     const std::string text =
@@ -171,27 +164,6 @@ INSTANTIATE_TEST_SUITE_P(WhileItRuns, LoopBreaks,
                                            std::pair("fault", "failed in read: too hot"),
                                            std::pair("odd", "not a std::exception")));
 
-Batch poke(UntypedFrontend& frontend, std::uint32_t how) {
-  add_request(frontend, Poke{how});
-  return frontend.pulse();
-}
-
-TEST_F(LoopTest, ServesRequests) {
-  const auto loop = started();
-  UntypedFrontend frontend("fake");
-  const Batch done = poke(frontend, 0);
-  const Batch rejected = poke(frontend, 1);
-  const Batch fresh = poke(frontend, 2);
-  EXPECT_EQ(loop->run_granted(kAll), Step::standing);
-  EXPECT_EQ(done.handle(0).status, Status::completed);
-  EXPECT_EQ(rejected.handle(0).status, Status::rejected);
-  EXPECT_EQ(rejected.handle(0).text, "not now");
-  EXPECT_EQ(fresh.handle(0).iteration, 1);
-  const UntypedObservation row = frontend.latest();
-  EXPECT_EQ(row.head().fresh, 1U);
-  EXPECT_EQ(desired(row, 1), 8.0);
-}
-
 TEST_F(LoopTest, EndsWhenARequestFailsOrThrows) {
   for (const auto& [how, why] : {std::pair(3U, "poked too hard"), std::pair(4U, "ouch")}) {
     FakeDriver::calls = {};
@@ -207,39 +179,13 @@ TEST_F(LoopTest, EndsWhenARequestFailsOrThrows) {
   }
 }
 
-TEST_F(LoopTest, EndsInOrderWhenTheDriverIsDone) {
-  const auto loop = started({{"finish_at", "4"}});
-  UntypedFrontend frontend("fake");
-  const Burst burst = frontend.start_burst(10);
-  EXPECT_EQ(loop->run_granted(kAll), Step::ended);
-  EXPECT_EQ(loop->fault(), "");
-  EXPECT_EQ(frontend.published(), 4) << "that row is there";
-  EXPECT_EQ(frontend.life(), Life::stopped);
-  EXPECT_THROW(burst.wait(kPatience), BackendStopped);
-  EXPECT_EQ(FakeDriver::calls.stopped, 1);
-}
-
-TEST_F(LoopTest, InterruptsWhatTheDriverSays) {
-  const auto loop = started();
-  UntypedFrontend frontend("fake");
-  add(frontend, 1, 9.0, {.pace = iterations(9)});
-  const Batch batch = frontend.pulse_to_end();
-  FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
-    if (reading.iteration() == 3) reading.interrupt(1);
-  };
-  EXPECT_EQ(loop->run_granted(kAll), Step::standing);
-  EXPECT_EQ(batch.handle(0).status, Status::interrupted);
-  EXPECT_EQ(batch.handle(0).iteration, 3);
-  EXPECT_EQ(frontend.published(), 3);
-}
-
 TEST_F(LoopTest, KeepsItsPeriodAndStopsWhenAsked) {
-  const auto loop = started({}, false);
+  const auto loop = started({}, in(false));
   UntypedFrontend frontend("fake");
   std::thread runner([&] { EXPECT_TRUE(loop->run().in_order); });
   const std::int64_t begin = frontend.wait_for(1, kPatience).time();
   const UntypedObservation row = frontend.wait_for(51, kPatience);
-  EXPECT_GE(row.time() - begin, 49 * 200'000) << "never faster than its period";
+  EXPECT_GE(row.time() - begin, 49 * kPeriod) << "never faster than its period";
   EXPECT_GT(next_row_at(), row.time());
   loop->ask_to_stop();
   runner.join();
@@ -249,7 +195,7 @@ TEST_F(LoopTest, KeepsItsPeriodAndStopsWhenAsked) {
 
 // rule W9
 TEST_F(LoopTest, PublishesAnOverrunAndSkipsThePeriodsInsteadOfHurrying) {
-  const auto loop = started({}, false);
+  const auto loop = started({}, in(false));
   UntypedFrontend frontend("fake");
   FakeDriver::on_write = [](const Desired<FakeDriver>& desired) {
     if (desired.iteration() != 5) return;
@@ -266,7 +212,7 @@ TEST_F(LoopTest, PublishesAnOverrunAndSkipsThePeriodsInsteadOfHurrying) {
   EXPECT_GE(late.overruns, before.overruns + 1);
   EXPECT_GE(late.skipped, before.skipped + 9);
   EXPECT_GE(late.lateness, 1'800'000);
-  EXPECT_GE(after.time - late.time, 34 * 200'000) << "what follows keeps its period";
+  EXPECT_GE(after.time - late.time, 34 * kPeriod) << "what follows keeps its period";
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <new>
 
-#include "robot/fake_driver.hpp"
 #include "robot/fake_simulator.hpp"
 #include "robot/loop/loop.hpp"
 

@@ -1,19 +1,13 @@
-#include <fcntl.h>
-#include <gmock/gmock.h>
 #include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
-#include "memory/child_process.hpp"
 #include "robot/fake_driver.hpp"
 
 namespace o80::test {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
 using ::testing::Not;
 
 constexpr uid_t kNobody = 65534;
@@ -32,67 +26,52 @@ class PrivilegedTest : public testing::Test {
     fs::copy(kPrefix + "/bin/o80-run", folder_ / "o80-run");
     fs::permissions(folder_ / "o80-run", fs::perms(04755));
     fs::copy(kTwoJoints, folder_ / "joints.so");
-    if (run({"--help"}) != 0) GTEST_SKIP() << "the file system ignores set-user-ID: " << said_;
+    const Outcome help = run({"--help"});
+    if (help.code != 0) GTEST_SKIP() << "the file system ignores set-user-ID: " << help.err;
   }
   ~PrivilegedTest() override {
     if (!folder_.empty()) fs::remove_all(folder_);
   }
 
-  /// The exit code; what was said is in `said_`.
-  int run(std::vector<const char*> arguments, std::vector<const char*> environment = {}) {
-    const fs::path output = folder_ / "said";
-    std::ofstream(output).close();
-    const std::string program = folder_ / "o80-run";
-    arguments.insert(arguments.begin(), program.c_str());
-    arguments.push_back(nullptr);
-    environment.push_back(nullptr);
-    ChildProcess child([&](const ChildProcess::Ready&) {
-      const int file = open(output.c_str(), O_WRONLY);
-      dup2(file, STDOUT_FILENO);
-      dup2(file, STDERR_FILENO);
-      dup2(open("/dev/null", O_RDONLY), STDIN_FILENO);
+  Outcome run(std::vector<std::string> words, const std::vector<std::string>& environment = {}) {
+    words.insert(words.begin(), folder_ / "o80-run");
+    Program program(words, [&] {
+      clearenv();
+      for (const std::string& each : environment) putenv(const_cast<char*>(each.c_str()));
       if (setgid(kNobody) != 0 || setuid(kNobody) != 0) _exit(99);
-      execve(program.c_str(), const_cast<char**>(arguments.data()),
-             const_cast<char**>(environment.data()));
-      _exit(98);
     });
-    const int code = child.wait();
-    std::stringstream text;
-    text << std::ifstream(output).rdbuf();
-    said_ = text.str();
-    return code;
+    program.close_input();
+    return program.end();
   }
-
   /// Starts the robot of the folder; it ends at once.
-  int run_joints(std::vector<const char*> environment = {}) {
-    const std::string robot = folder_ / "joints.so";
+  Outcome run_joints(const std::vector<std::string>& environment = {}) {
     const std::string segment = "--segment=privileges-" + std::to_string(getpid());
-    return run({robot.c_str(), segment.c_str(), "--bursting", "--until-eof"},
-               std::move(environment));
+    return run({folder_ / "joints.so", segment, "--bursting", "--until-eof"}, environment);
   }
 
   fs::path folder_;
-  std::string said_;
 };
 
 TEST_F(PrivilegedTest, LoadOnlyRobotsThatNobodyButRootCanWrite) {
-  EXPECT_EQ(run_joints(), 0) << said_;
+  EXPECT_EQ(run_joints().code, 0);
+  const auto refusal = [&] {
+    const Outcome outcome = run_joints();
+    EXPECT_EQ(outcome.code, 1);
+    return outcome.err;
+  };
 
   fs::permissions(folder_ / "joints.so", fs::perms(0666));
-  EXPECT_EQ(run_joints(), 1);
-  EXPECT_THAT(said_, HasSubstr("users other than root can write the library"));
+  EXPECT_THAT(refusal(), HasSubstr("users other than root can write the library"));
 
   fs::permissions(folder_ / "joints.so", fs::perms(0644));
   ASSERT_EQ(chown((folder_ / "joints.so").c_str(), kNobody, kNobody), 0);
-  EXPECT_EQ(run_joints(), 1);
-  EXPECT_THAT(said_, HasSubstr("rtprio"));
+  EXPECT_THAT(refusal(), HasSubstr("rtprio"));
 }
 
 TEST_F(PrivilegedTest, IgnoreTheEnvironment) {
-  EXPECT_EQ(run_joints({"O80_DIRECTORY=/nowhere"}), 0) << said_;
-  const std::string path = "O80_ROBOT_PATH=" + folder_.string();
-  run({}, {path.c_str()});
-  EXPECT_THAT(said_, Not(HasSubstr(folder_.string())));
+  EXPECT_EQ(run_joints({"O80_DIRECTORY=/nowhere"}).code, 0);
+  const Outcome outcome = run({}, {"O80_ROBOT_PATH=" + folder_.string()});
+  EXPECT_THAT(outcome.out + outcome.err, Not(HasSubstr(folder_.string())));
 }
 
 }  // namespace

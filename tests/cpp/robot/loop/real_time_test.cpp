@@ -1,6 +1,5 @@
 #include "o80/robot/real_time.hpp"
 
-#include <gmock/gmock.h>
 #include <sched.h>
 #include <sys/resource.h>
 
@@ -9,14 +8,10 @@
 
 #include "memory/child_process.hpp"
 #include "robot/fake_driver.hpp"
-#include "robot/loop/loop.hpp"
 
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 /// In a thread of its own, so that nothing stays set.
@@ -81,24 +76,22 @@ TEST_F(RealTimeLoop, MeetsNoPageForTheFirstTimeInAnIteration) {
 #if defined(O80_TEST_SANITIZED) || defined(O80_TEST_EMULATOR)
   GTEST_SKIP() << "a sanitizer has pages of its own, an emulator too";
 #endif
-  Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{}),
-            {.segment = "fake", .bursting = true, .history = 20'000});
-  loop.start();
+  const auto loop = started({}, {.segment = "fake", .bursting = true, .history = 20'000});
   UntypedFrontend frontend("fake");
   // a batch and a burst, so that code and data have been used once; the history and lane have not
   send(frontend, 0, 1.0, {.pace = iterations(3)});
   add_request(frontend, Poke{1});
   frontend.start_burst(1);
-  loop.run_granted(kAll);
+  loop->run_granted(kAll);
 
   std::thread([&] {
     set_up_real_time({});
     frontend.start_burst(5);
-    loop.run_granted(kAll);
+    loop->run_granted(kAll);
     // a whole lane, the whole history
     for (int i = 0; i < 16'000; ++i) add(frontend, i % 2, 1.0, {.pace = direct()});
     frontend.start_burst(25'000);
-    EXPECT_EQ(faults_in([&] { loop.run_granted(kAll); }), 0);
+    EXPECT_EQ(faults_in([&] { loop->run_granted(kAll); }), 0);
   }).join();
   EXPECT_GT(frontend.oldest(), 0);
 }

@@ -2,8 +2,6 @@
 
 #include "robot/loop/replay.hpp"
 
-#include <gmock/gmock.h>
-
 #include <algorithm>
 #include <cstring>
 #include <random>
@@ -11,7 +9,6 @@
 #include <thread>
 
 #include "cases.hpp"
-#include "o80/robot/make_table.hpp"
 #include "robot/fake_driver.hpp"
 #include "runtime/replay/driverless_replay.hpp"
 
@@ -139,8 +136,8 @@ std::unique_ptr<DriverInstance> rig(double bent = 0) {
                                           OptionValues{{"bent", std::to_string(bent)}});
 }
 
-BackendOptions options_of(bool bursting) {
-  return {.segment = "rig",
+BackendOptions options_of(bool bursting, const char* segment = "rig") {
+  return {.segment = segment,
           .period = 50'000,
           .bursting = bursting,
           .history = 1U << 16,
@@ -322,6 +319,19 @@ std::vector<std::byte> comparable(const Recorded& recorded, std::span<const std:
   return bytes;
 }
 
+/// The first of these rows that a replay has not repeated, or -1.
+Iteration first_difference(const Recorded& recorded, std::size_t begin, std::size_t end) {
+  const UntypedFrontend reader("replay", {.access = Access::read_only, .dead = true});
+  const Rows rows = reader.history(static_cast<Iteration>(begin), reader.published());
+  for (std::size_t i = begin; i < end; ++i) {
+    if (i - begin < rows.count &&
+        comparable(recorded, rows.row(i - begin)) == comparable(recorded, recorded.rows.row(i)))
+      continue;
+    return static_cast<Iteration>(i);
+  }
+  return -1;
+}
+
 /// The first row that a replay does not repeat, or -1; and what it says about the driver.
 struct Verdict {
   Iteration row = -1;
@@ -329,30 +339,15 @@ struct Verdict {
 };
 
 Verdict replayed(const Recorded& recorded, double bent = 0) {
-  BackendOptions options = options_of(recorded.bursting);
-  options.segment = "replay";
-  Replay replay(rig(bent), options);
+  Replay replay(rig(bent), options_of(recorded.bursting, "replay"));
   for (const JournalEntry& entry : recorded.entries) replay.add(entry);
   EXPECT_TRUE(replay.run(recorded.times())) << replay.fault();
-  const UntypedFrontend reader("replay", {.access = Access::read_only, .dead = true});
-  const Rows rows = reader.history(0, reader.published());
-  Verdict verdict{-1, replay.mismatch()};
-  for (std::size_t i = 0; i < recorded.rows.count; ++i) {
-    if (i < rows.count &&
-        comparable(recorded, rows.row(i)) == comparable(recorded, recorded.rows.row(i))) {
-      continue;
-    }
-    verdict.row = static_cast<Iteration>(i);
-    break;
-  }
-  return verdict;
+  return {first_difference(recorded, 0, recorded.rows.count), replay.mismatch()};
 }
 
 /// The first row whose desired states a backend without the driver does not repeat, or -1.
 Verdict replayed_without_driver(const Recorded& recorded, std::size_t part = 100) {
-  BackendOptions options = options_of(recorded.bursting);
-  options.segment = "replay";
-  DriverlessReplay replay(recorded.schema, options);
+  DriverlessReplay replay(recorded.schema, options_of(recorded.bursting, "replay"));
   for (const JournalEntry& entry : recorded.entries) replay.add(entry);
   Verdict verdict;
   for (std::size_t begin = 0; begin < recorded.rows.count;) {
@@ -365,13 +360,7 @@ Verdict replayed_without_driver(const Recorded& recorded, std::size_t part = 100
       rows.insert(rows.end(), row.begin(), row.end());
     }
     EXPECT_TRUE(replay.run(rows)) << replay.fault();
-    const UntypedFrontend reader("replay", {.access = Access::read_only, .dead = true});
-    const Rows found = reader.history(static_cast<Iteration>(begin), reader.published());
-    for (std::size_t i = begin; i < end && verdict.row < 0; ++i) {
-      if (i - begin >= found.count ||
-          comparable(recorded, found.row(i - begin)) != comparable(recorded, recorded.rows.row(i)))
-        verdict.row = static_cast<Iteration>(i);
-    }
+    if (verdict.row < 0) verdict.row = first_difference(recorded, begin, end);
     begin = end;
   }
   verdict.mismatch = replay.mismatch();
@@ -477,9 +466,7 @@ TEST_P(ReplayTest, ItBeginsAtAnyResetOrRestoredSnapshot) {
     const auto row = static_cast<std::size_t>(start->iteration);
     if (recorded.head(row).halted != 0) continue;
 
-    BackendOptions options = options_of(true);
-    options.segment = "replay";
-    Replay replay(rig(), options);
+    Replay replay(rig(), options_of(true, "replay"));
     replay.begin_at(start->iteration);
     if (!kept.empty()) replay.load_snapshot(0, kept);
     for (const JournalEntry& each : recorded.entries) {
@@ -488,13 +475,7 @@ TEST_P(ReplayTest, ItBeginsAtAnyResetOrRestoredSnapshot) {
     const std::vector<std::int64_t> times = recorded.times();
     ASSERT_TRUE(replay.run(std::span(times).subspan(row - 1))) << replay.fault();
     EXPECT_EQ(text_of(replay.mismatch()), "") << "from " << row;
-    const UntypedFrontend reader("replay", {.access = Access::read_only, .dead = true});
-    const Rows rows = reader.history(start->iteration, reader.published());
-    ASSERT_EQ(rows.count, recorded.rows.count - row);
-    for (std::size_t k = 0; k < rows.count; ++k) {
-      ASSERT_EQ(comparable(recorded, rows.row(k)), comparable(recorded, recorded.rows.row(row + k)))
-          << "row " << row + k << " of a replay from " << row;
-    }
+    ASSERT_EQ(first_difference(recorded, row, recorded.rows.count), -1) << "from " << row;
     ++begun;
   }
   EXPECT_GT(begun, 3);
@@ -504,11 +485,8 @@ class HardwareReplayTest : public FakeDriverTest {};
 
 TEST_F(HardwareReplayTest, ARobotThatMayBeHardwareIsNotStarted) {
   FakeDriver::simulated = false;
-  BackendOptions options;
-  options.segment = "replay";
-  options.bursting = true;
   try {
-    Replay replay(std::make_unique<DriverInstance>(table(), OptionValues{}), options);
+    Replay replay(driver(), {.segment = "replay", .bursting = true});
     replay.run(std::array<std::int64_t, 2>{0, 1});
     FAIL() << "it does not declare that it is simulated";
   } catch (const DriverError& error) {

@@ -6,7 +6,6 @@
 #include <map>
 #include <random>
 
-#include "o80/robot/run.hpp"
 #include "robot/fake_driver.hpp"
 #include "robot/loop/loop.hpp"
 #include "runtime/backend/backend_options.hpp"
@@ -14,11 +13,6 @@
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::Contains;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::Pair;
 using ::testing::SizeIs;
 
 /// A robot that draws something at random, and one of whose options names a file.
@@ -118,17 +112,6 @@ TEST_F(RobotProvenanceTest, NamesTheFilesOfOptionsWithTheirHashes) {
   // not a file, and a folder
   EXPECT_THAT(provenance_of(dice(), {{"model", model.string()}}).files, SizeIs(0));
   EXPECT_THAT(provenance_of(dice(), {{"model", folder.string()}}).files, SizeIs(0));
-}
-
-TEST_F(RobotProvenanceTest, OfARobotThatFailedToStartIsThereToo) {
-  std::vector<std::string> words{"fake", "--fails=construct", "--gain=3"};
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  EXPECT_EQ(o80::run(table(), static_cast<int>(words.size()), arguments.data()), 1);
-  const UntypedFrontend frontend("fake", {.access = Access::read_only, .dead = true});
-  EXPECT_EQ(frontend.provenance().robot, "fake");
-  EXPECT_THAT(frontend.provenance().options, Contains(Pair("gain", "3")));
 }
 
 /// Options of a backend and its loop that are drawn from a seed; each may occur.

@@ -9,19 +9,16 @@
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using ::testing::Pair;
 
 class RunOptionsTest : public FakeDriverTest {
  protected:
-  static RunOptions parse(std::vector<std::string> words) {
+  static RunOptions parse(std::vector<std::string> words, const RobotTable& robot = table()) {
     words.insert(words.begin(), "o80-run");
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
-    return parse_run_options(table(), static_cast<int>(words.size()), arguments.data());
+    return parse_run_options(robot, static_cast<int>(words.size()), arguments.data());
   }
   static std::string refusal(const std::vector<std::string>& words) {
     return message_of<InvalidArgument>([&] { parse(words); });
@@ -123,10 +120,7 @@ struct Greedy {
 O80_DESCRIBE(Greedy::Config, lane_blocks);
 
 TEST_F(RunOptionsTest, RefuseARobotThatTakesAFlagOfEveryRobot) {
-  std::string program = "o80-run";
-  char* words[] = {program.data(), nullptr};
-  EXPECT_THAT(message_of<InvalidArgument>(
-                  [&] { parse_run_options(*robot_table<Greedy>("greedy"), 1, words); }),
+  EXPECT_THAT(message_of<InvalidArgument>([] { parse({}, *robot_table<Greedy>("greedy")); }),
               AllOf(HasSubstr("'lane_blocks'"), HasSubstr("rename it")));
 }
 
@@ -148,12 +142,9 @@ TEST_F(RunOptionsTest, EveryOneOfManyOptionsIsRead) {
   const RobotTable table = table_of_many_options();
   for (const Option& option : options_of(table)) {
     for (const bool dashes : {true, false}) {
-      std::string program = "o80-run";
       std::string word = "--" + option.name + "=7";
       if (dashes) std::ranges::replace(word, '_', '-');
-      char* words[] = {program.data(), word.data(), nullptr};
-      EXPECT_THAT(parse_run_options(table, 2, words).robot, ElementsAre(Pair(option.name, "7")))
-          << word;
+      EXPECT_THAT(parse({word}, table).robot, ElementsAre(Pair(option.name, "7"))) << word;
     }
   }
 }

@@ -24,9 +24,9 @@
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
+using ::testing::Contains;
 using ::testing::Not;
+using ::testing::Pair;
 
 /// A processor that this process may use.
 int usable_processor() {
@@ -63,6 +63,15 @@ int run_here(const RobotTable& table, std::vector<std::string> words) {
   arguments.push_back(nullptr);
   return run(table, static_cast<int>(words.size()), arguments.data());
 }
+/// The same, with what it says.
+Outcome outcome_of(const RobotTable& table, const std::vector<std::string>& words) {
+  ::testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
+  Outcome outcome{.code = run_here(table, words), .out = {}, .err = {}};
+  outcome.out = ::testing::internal::GetCapturedStdout();
+  outcome.err = ::testing::internal::GetCapturedStderr();
+  return outcome;
+}
 
 /// A stepper motor and a switch, that is done at once.
 struct Stepper {
@@ -82,11 +91,10 @@ O80_DESCRIBE(Stepper::Config);
 O80_DESCRIBE(Stepper::Axis, (position, "[steps]"), powered);
 
 TEST_F(RunTest, SaysAtItsStartWhichNumbersAHaltStopsInOneIteration) {
-  ::testing::internal::CaptureStdout();
-  EXPECT_EQ(run_here(*robot_table<Stepper>("stepper"), {}), 0);
-  EXPECT_THAT(::testing::internal::GetCapturedStdout(),
-              AllOf(HasSubstr("no acceleration limit on"), HasSubstr("position"),
-                    Not(HasSubstr("powered"))));
+  const Outcome outcome = outcome_of(*robot_table<Stepper>("stepper"), {});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("no acceleration limit on"), HasSubstr("position"),
+                                 Not(HasSubstr("powered"))));
 }
 
 /// Whether threads of this process may have the policy fifo.
@@ -128,11 +136,8 @@ TEST_F(RunTest, WithPolicyAutoALoopThatDoesNotSleepBecomesAnOrdinaryThreadAndGoe
   if (!is_fifo_allowed() || CPU_COUNT(&allowed) < 2)
     GTEST_SKIP() << "this process may not use the policy fifo, or has one processor";
   ChildProcess child([&](const auto&) {
-    ::testing::internal::CaptureStdout();
-    ::testing::internal::CaptureStderr();
-    const int code = run_here(*robot_table<Spinning>("spinning"), {"--policy", "auto"});
-    const std::string out = ::testing::internal::GetCapturedStdout();
-    const std::string err = ::testing::internal::GetCapturedStderr();
+    const auto [code, out, err] =
+        outcome_of(*robot_table<Spinning>("spinning"), {"--policy", "auto"});
     EXPECT_EQ(code, 0);
     EXPECT_EQ(Spinning::policy_before, SCHED_FIFO);
     EXPECT_EQ(Spinning::policy(), SCHED_OTHER);
@@ -146,20 +151,19 @@ TEST_F(RunTest, WithPolicyAutoALoopThatDoesNotSleepBecomesAnOrdinaryThreadAndGoe
 TEST_F(RunTest, WithPolicyAutoSimulatedRobotsAndPythonsAreOrdinaryThreads) {
   for (const bool simulated : {true, false}) {
     FakeDriver::simulated = simulated;
-    ::testing::internal::CaptureStdout();
-    EXPECT_EQ(run_here(table(), {"--policy", "auto", "--finish-at", "1"}), 0);
-    EXPECT_THAT(::testing::internal::GetCapturedStdout(), HasSubstr("policy auto: other"));
+    const Outcome outcome = outcome_of(table(), {"--policy", "auto", "--finish-at", "1"});
+    EXPECT_EQ(outcome.code, 0);
+    EXPECT_THAT(outcome.out, HasSubstr("policy auto: other"));
     EXPECT_EQ(sched_getscheduler(0), SCHED_OTHER);
   }
 }
 
 TEST_F(RunTest, SaysWhereThePolicyFifoIsAllowedUnlessOneIsChosen) {
   const bool is_allowed = is_fifo_allowed();
-  const auto says_so = [](const RobotTable& table, std::vector<std::string> words) {
-    ::testing::internal::CaptureStdout();
-    EXPECT_EQ(run_here(table, std::move(words)), 0);
-    const std::string said = ::testing::internal::GetCapturedStdout();
-    return said.find("allows --policy fifo") != std::string::npos;
+  const auto says_so = [](const RobotTable& table, const std::vector<std::string>& words) {
+    const Outcome outcome = outcome_of(table, words);
+    EXPECT_EQ(outcome.code, 0);
+    return outcome.out.find("allows --policy fifo") != std::string::npos;
   };
   const RobotTable& of_the_world = *robot_table<Stepper>("stepper");
   EXPECT_EQ(says_so(of_the_world, {}), is_allowed);
@@ -267,15 +271,6 @@ TEST_F(RunTest, OneThatIsAskedToStopWhileItStartsEndsAtOnce) {
   EXPECT_EQ(FakeDriver::calls.stopped, 1);
 }
 
-TEST_F(RunTest, StopsABurstingRobotThatStandsStill) {
-  Program program(two_joints({"--bursting"}));
-  ASSERT_TRUE(program.says("bursting, 1 ms an iteration"));
-  UntypedFrontend frontend("two_joints", {.timeout = kPatience});
-  EXPECT_EQ(frontend.burst(3, kPatience).iteration(), 3);
-  program.signal(SIGTERM);
-  EXPECT_EQ(program.end().code, 0);
-}
-
 TEST_F(RunTest, StopsWhenItsInputEndsIfToldSo) {
   Program program(two_joints({"--until-eof"}));
   ASSERT_TRUE(program.says("runs on segment"));
@@ -287,9 +282,9 @@ TEST_F(RunTest, StopsWhenItsInputEndsIfToldSo) {
 // rule O11
 TEST_F(RunTest, ASecondOneOfTheNameDoesNotEvenConstructItsDriver) {
   ManualBackend owner({.segment = "fake"});
-  ::testing::internal::CaptureStderr();
-  EXPECT_EQ(run_here(table(), {}), 1);
-  EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr("already has a backend"));
+  const Outcome outcome = outcome_of(table(), {});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("already has a backend"));
   EXPECT_EQ(FakeDriver::calls.constructed, 0);
 }
 
@@ -301,19 +296,22 @@ TEST_F(RunTest, LeavesTheFaultOfAConstructorForWhoWaitsToAttach) {
           message_of<BackendFailed>([] { UntypedFrontend("fake", {.timeout = kPatience}); }),
           HasSubstr(why));
     });
-    ::testing::internal::CaptureStderr();
-    EXPECT_EQ(run_here(table(), {"--fails", fails}), 1);
-    EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr(why));
+    const Outcome outcome = outcome_of(table(), {"--fails", fails, "--gain", "3"});
+    EXPECT_EQ(outcome.code, 1);
+    EXPECT_THAT(outcome.err, HasSubstr(why));
     waiter.join();
     EXPECT_EQ(directory_.files(), 2U) << "they stay to be read";
+    const UntypedFrontend dead("fake", {.access = Access::read_only, .dead = true});
+    EXPECT_EQ(dead.provenance().robot, "fake");
+    EXPECT_THAT(dead.provenance().options, Contains(Pair("gain", "3")));
     std::filesystem::remove(directory_.file_of("fake"));
   }
 }
 
 TEST_F(RunTest, RunsInItsOwnMainAndFinishesInOrder) {
-  ::testing::internal::CaptureStdout();
-  EXPECT_EQ(run_here(table(), {"--finish-at", "3", "--frequency", "5000"}), 0);
-  EXPECT_THAT(::testing::internal::GetCapturedStdout(), HasSubstr("fake runs on segment"));
+  const Outcome outcome = outcome_of(table(), {"--finish-at", "3", "--frequency", "5000"});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.out, HasSubstr("fake runs on segment"));
   EXPECT_EQ(FakeDriver::calls.stopped, 1);
   EXPECT_EQ(FakeDriver::calls.destroyed, 1);
   struct sigaction now{};
@@ -401,9 +399,9 @@ TEST_F(RunTest, PolicyPriorityProcessorAndLockedMemoryAreWhatWasAskedFor) {
 }
 
 TEST_F(RunTest, ReportsAFaultAndEndsWithAFailure) {
-  ::testing::internal::CaptureStderr();
-  EXPECT_EQ(run_here(table(), {"--fails", "read", "--frequency", "5000"}), 1);
-  EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr("failed in read: went blind"));
+  const Outcome outcome = outcome_of(table(), {"--fails", "read", "--frequency", "5000"});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("failed in read: went blind"));
   EXPECT_EQ(FakeDriver::calls.stopped, 1);
 }
 

@@ -1,6 +1,5 @@
 // What a service manager (systemd) hears from a robot's process.
 
-#include <gmock/gmock.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -14,9 +13,6 @@
 
 namespace o80::test {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 
 /// The service manager's end of the socket that NOTIFY_SOCKET names.
 class Manager {

@@ -1,12 +1,9 @@
 // A driver that paces the loop itself, and one whose wait returns too early.
 
-#include <gmock/gmock.h>
-
 #include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 
 #include "o80/robot/make_table.hpp"
 #include "robot/loop/loop.hpp"
@@ -15,9 +12,6 @@
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-
 /// Ticks by itself, until its cable is pulled.
 class Ticking {
  public:
@@ -25,7 +19,7 @@ class Ticking {
   using Actuators = std::array<double, 1>;
 
   static inline int in_time = 0;  // waits that take their time
-  static inline int stopped = 0;
+  static inline std::int64_t finish_at = 0;
   static inline std::function<void(Reading<Ticking>&)> on_read;
   static inline std::function<void()> on_wait;
 
@@ -36,15 +30,17 @@ class Ticking {
   void read(Reading<Ticking>& reading) {
     reading.observed = now_;
     if (on_read) on_read(reading);
-    if (reading.iteration() == 100'000) reading.finish();  // nobody has noticed
+    if (reading.iteration() == finish_at) reading.finish();
   }
   void wait(std::int64_t due) {
     if (on_wait) on_wait();
-    if (++waits_ > in_time) return;
-    while (!sleep_until(due)) {
+    if (++waits_ <= in_time) sleep(due);
+  }
+  static void sleep(std::int64_t until) {
+    while (!sleep_until(until)) {
     }
   }
-  void stop() noexcept { ++stopped; }
+  void stop() noexcept {}
 
  private:
   std::array<double, 1> now_{};
@@ -56,24 +52,22 @@ class TickTest : public ManualBackendTest {
  protected:
   TickTest() {
     Ticking::in_time = 1'000'000;
-    Ticking::stopped = 0;
     Ticking::on_read = {};
     Ticking::on_wait = {};
   }
-  static std::unique_ptr<Loop> make(const BackendOptions& options) {
-    return std::make_unique<Loop>(
+  static std::unique_ptr<Loop> started_until(std::int64_t finish_at) {
+    Ticking::finish_at = finish_at;
+    auto loop = std::make_unique<Loop>(
         std::make_unique<DriverInstance>(*robot_table<Ticking>("ticking"), OptionValues{}),
-        options);
+        BackendOptions{.segment = "ticking", .period = 1'000'000});
+    loop->start();
+    return loop;
   }
 };
 
 TEST_F(TickTest, AWaitThatReturnsAtOnceHaltsAndTheRobotDoesNotBrakeFasterThanItMay) {
   Ticking::in_time = 20;
-  const auto loop = make({.segment = "ticking", .period = 1'000'000});
-  Ticking::on_read = [](Reading<Ticking>& reading) {
-    if (reading.iteration() == 100) reading.finish();
-  };
-  loop->start();
+  const auto loop = started_until(100);
   const UntypedFrontend frontend("ticking");
   EXPECT_TRUE(loop->run().in_order);
   const auto halt = frontend.halted();
@@ -88,39 +82,31 @@ TEST_F(TickTest, AWaitThatReturnsAtOnceHaltsAndTheRobotDoesNotBrakeFasterThanItM
 }
 
 TEST_F(TickTest, JitterOfTheRobotsClockHaltsAndAResumeGoesOn) {
-  const auto loop = make({.segment = "ticking", .period = 1'000'000});
-  std::optional<UntypedFrontend> frontend;
+  const auto loop = started_until(330);
+  UntypedFrontend frontend("ticking");
   Ticking::on_wait = [waits = 0]() mutable {
     ++waits;
     if (waits > 50 && waits < 250) return;  // many ticks that come together
-    const std::int64_t until = monotonic_now() + 1'000'000;
-    while (!sleep_until(until)) {
-    }
+    Ticking::sleep(monotonic_now() + 1'000'000);
   };
   Ticking::in_time = 0;
   std::uint64_t number = 0;
   Ticking::on_read = [&](Reading<Ticking>& reading) {
-    if (reading.iteration() == 300 && !reading.fresh()) {
-      if (const auto halt = frontend->halted()) number = halt->number;
-      send_resume(*frontend, number);
-    }
-    if (reading.iteration() == 330) reading.finish();
+    if (reading.iteration() != 300 || reading.fresh()) return;
+    if (const auto halt = frontend.halted()) number = halt->number;
+    send_resume(frontend, number);
   };
-  loop->start();
-  frontend.emplace("ticking");
   EXPECT_TRUE(loop->run().in_order);
   EXPECT_EQ(number, 1U);
-  EXPECT_FALSE(frontend->halted());
+  EXPECT_FALSE(frontend.halted());
 }
 
 TEST_F(TickTest, ATickWithoutAReadingCountsInItsRowLikeAnOverrun) {
-  const auto loop = make({.segment = "ticking", .period = 1'000'000});
+  const auto loop = started_until(12);
   Ticking::on_read = [](Reading<Ticking>& reading) {
     const std::int64_t i = reading.iteration();
     if (i == 5 || i == 6 || i == 9) reading.missed();
-    if (i == 12) reading.finish();
   };
-  loop->start();
   const UntypedFrontend frontend("ticking");
   EXPECT_TRUE(loop->run().in_order);
   const auto overruns = [&](std::int64_t i) {
@@ -131,17 +117,10 @@ TEST_F(TickTest, ATickWithoutAReadingCountsInItsRowLikeAnOverrun) {
 
 // rule W9
 TEST_F(TickTest, TheStepAfterMissedTicksIsNotLarger) {
-  const auto loop = make({.segment = "ticking", .period = 1'000'000});
+  const auto loop = started_until(21);
   Ticking::on_wait = [waits = 0]() mutable {
-    if (++waits != 10) return;
-    const std::int64_t until = monotonic_now() + 5'600'000;
-    while (!sleep_until(until)) {
-    }
+    if (++waits == 10) Ticking::sleep(monotonic_now() + 5'600'000);
   };
-  Ticking::on_read = [](Reading<Ticking>& reading) {
-    if (reading.iteration() == 21) reading.finish();
-  };
-  loop->start();
   UntypedFrontend frontend("ticking");
   add(frontend, 0, 20.0, {.pace = iterations(20)});
   frontend.pulse();

@@ -1,13 +1,10 @@
 #include "o80/runtime/backend.hpp"
 #include <optional>
 
-#include "runtime/manual_backend.hpp"
 #include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
-
-using ::testing::HasSubstr;
 
 class BackendTest : public ManualBackendTest {};
 
@@ -27,8 +24,7 @@ TEST_F(BackendTest, RowZeroIsTheRobotBeforeAnythingWasAsked) {
 
 // rule O2
 TEST_F(BackendTest, ARowShowsWhatWasAskedAndWhatCameOfIt) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair();
   send(frontend, 0, 1.0);
   manual.run(1);
   const UntypedObservation row = frontend.latest();
@@ -38,13 +34,6 @@ TEST_F(BackendTest, ARowShowsWhatWasAskedAndWhatCameOfIt) {
   EXPECT_EQ(unpack<double>(row.extended()), 1.0);
   EXPECT_TRUE(row.active(0));
   EXPECT_FALSE(row.active(1));
-}
-
-TEST_F(BackendTest, IsStartingUntilRowZeroAndRunningFromThenOn) {
-  ManualBackend manual;
-  EXPECT_THROW(UntypedFrontend("pair", {.timeout = kAtOnce}), TimeoutError);
-  manual.start();
-  EXPECT_EQ(UntypedFrontend("pair").life(), Life::running);
 }
 
 TEST_F(BackendTest, TakesABatchWholeForAllActuators) {
@@ -78,8 +67,7 @@ TEST_F(BackendTest, NothingIsCompletedBeforeItsRowIsOut) {
 }
 
 TEST_F(BackendTest, WhatEndsInARowThatIsNeverMadeIsNotCompleted) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair();
   const Batch batch = send(frontend, 0, 1.0);
   ASSERT_EQ(manual.backend.try_step(), Step::run);
   manual.backend.end(BackendState::failed, "the arm fell off");
@@ -143,8 +131,7 @@ TEST_F(BackendTest, APastUntilIsRejectedAsLateAndTheNextStartsInItsPlace) {
 
 // rule O8
 TEST_F(BackendTest, TellsTimeByTheIterationWhenItBursts) {
-  StartedBackend manual({.segment = "pair", .period = 2'000'000, .bursting = true});
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair", .period = 2'000'000, .bursting = true});
   frontend.start_burst(3);
   EXPECT_EQ(manual.drive(), Step::standing);
   EXPECT_EQ(frontend.latest().time(), 6'000'000);

@@ -1,8 +1,6 @@
 // A burst ends early for its own sender: its cancel, its close, a wait that it gives up. A group of
 // bursts begins whole or not at all.
 
-#include <gtest/gtest.h>
-
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,46 +10,38 @@
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-
-class BurstCancelTest : public ManualBackendTest {
- protected:
-  /// Plays a trace of a bursting backend.
-  static void play(const std::string& script) {
-    test::play({.segment = "pair", .bursting = true}, script);
-  }
-};
+using BurstCancelTest = ManualBackendTest;
 
 // rule G3
 TEST_F(BurstCancelTest, ACancelledBurstEndsAfterTheIterationUnderWay) {
-  play(
+  play_bursts(
       "a = burst 1e15; run 3; in 4 cancel a; run 1; drive; a done 4; b = burst 2; drive; b done 6");
 }
 
 TEST_F(BurstCancelTest, OneThatHasNotBegunRunsNoIterationAndNoOtherIsTouched) {
-  play(R"(a = burst 3; b = burst 1e9; c = burst 2; cancel b; drive; a done 3; b done 3; c done 5)");
+  play_bursts(
+      R"(a = burst 3; b = burst 1e9; c = burst 2; cancel b; drive; a done 3; b done 3; c done 5)");
 }
 
 // rule G3
 TEST_F(BurstCancelTest, WhatWasSentWithItStaysQueued) {
-  play(R"(0 to 8 over 8; a = burst 1000; run 2; cancel a; drive; a active; burst 6; a completed)");
+  play_bursts(
+      R"(0 to 8 over 8; a = burst 1000; run 2; cancel a; drive; a active; burst 6; a completed)");
 }
 
 TEST_F(BurstCancelTest, ItEndsWhenItsSenderCloses) {
-  play("B: a = burst 1e15; run 2; B: close; drive; last 2");
+  play_bursts("B: a = burst 1e15; run 2; B: close; drive; last 2");
 }
 
 // rule G3
 TEST_F(BurstCancelTest, AnotherFrontendEndsItByNeitherCloseNorPurge) {
-  play(R"(B: b = purge own; a = burst 5; run 2; B: c = purge; run 1
+  play_bursts(R"(B: b = purge own; a = burst 5; run 2; B: c = purge; run 1
     c taken -1  # nothing sent later acts in a burst
     B: close; run 2; drive; last 5; c taken 6  # before the next one)");
 }
 
 TEST_F(BurstCancelTest, TheRestIsCancelledWhenTheCallGivesUpItsWait) {
-  StartedBackend manual({.segment = "pair", .bursting = true});
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair", .bursting = true});
   EXPECT_THROW(frontend.burst(1'000'000, kAtOnce), TimeoutError);
   EXPECT_THROW(frontend.burst(1'000'000, kPatience, [] { return false; }), Cancelled);
   add(frontend, 0, 1.0, {.pace = iterations(1'000'000)});
@@ -63,8 +53,7 @@ TEST_F(BurstCancelTest, TheRestIsCancelledWhenTheCallGivesUpItsWait) {
 }
 
 TEST_F(BurstCancelTest, ABurstThatWasStartedCanBeWaitedForAgainAfterATimeout) {
-  StartedBackend manual({.segment = "pair", .bursting = true});
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair", .bursting = true});
   const Burst burst = frontend.start_burst(4);
   EXPECT_THROW(burst.wait(kAtOnce), TimeoutError);
   EXPECT_EQ(manual.drive(), Step::standing);
@@ -123,10 +112,14 @@ TEST_F(BurstGroupTest, NoMemberOfAGroupMovesIfOneCannot) {
   EXPECT_EQ(frontend.pulse().size(), 1U);
 }
 
-TEST_F(BurstGroupTest, AGroupReturnsAtOnceWithEachItsOwnIterationsToWaitFor) {
-  StartedBackend other({.segment = "other", .bursting = true});
-  UntypedFrontend first("pair");
-  UntypedFrontend second("other");
+class BurstGroupOfTwoTest : public BurstGroupTest {
+ protected:
+  StartedBackend other{{.segment = "other", .bursting = true}};
+  UntypedFrontend first{"pair"};
+  UntypedFrontend second{"other"};
+};
+
+TEST_F(BurstGroupOfTwoTest, ReturnsAtOnceWithEachItsOwnIterationsToWaitFor) {
   const BurstMember group[] = {{&first, 5}, {&second, 3}};
   const std::vector<Burst> bursts = start_bursts(group);
   ASSERT_EQ(bursts.size(), 2U);
@@ -140,10 +133,7 @@ TEST_F(BurstGroupTest, AGroupReturnsAtOnceWithEachItsOwnIterationsToWaitFor) {
   EXPECT_EQ(rows[1].iteration(), 3);
 }
 
-TEST_F(BurstGroupTest, AGroupThatIsNotDoneInTimeIsCancelledWhole) {
-  StartedBackend other({.segment = "other", .bursting = true});
-  UntypedFrontend first("pair");
-  UntypedFrontend second("other");
+TEST_F(BurstGroupOfTwoTest, ThatIsNotDoneInTimeIsCancelledWhole) {
   const BurstMember group[] = {{&first, 1'000'000}, {&second, 1'000'000}};
   EXPECT_THROW(burst(group, kAtOnce), TimeoutError);
   manual.drive();
@@ -153,12 +143,10 @@ TEST_F(BurstGroupTest, AGroupThatIsNotDoneInTimeIsCancelledWhole) {
 }
 
 /// A group of two under way, whose second member has run two iterations and fails then.
-class BurstGroupFailureTest : public BurstGroupTest {
+class BurstGroupFailureTest : public BurstGroupOfTwoTest {
  protected:
   BurstGroupFailureTest() {
-    other.start();
-    second.emplace("other");
-    const BurstMember group[] = {{&first, 1'000'000'000}, {&*second, 1'000'000'000}};
+    const BurstMember group[] = {{&first, 1'000'000'000}, {&second, 1'000'000'000}};
     bursts = start_bursts(group);
     manual.run(3);
     other.run(2);
@@ -172,9 +160,6 @@ class BurstGroupFailureTest : public BurstGroupTest {
     EXPECT_EQ(manual.last(), 3);
   }
 
-  ManualBackend other{{.segment = "other", .bursting = true}};
-  UntypedFrontend first{"pair"};
-  std::optional<UntypedFrontend> second;
   std::vector<Burst> bursts;
 };
 
@@ -190,7 +175,7 @@ TEST_F(BurstGroupFailureTest, SoIsOneWhoseBackendEnds) {
 }
 
 TEST_F(BurstGroupFailureTest, SoIsOneWhoseFrontendIsClosed) {
-  second->close();
+  second.close();
   expect_failure<Closed>("");
 }
 
@@ -201,7 +186,7 @@ TEST_F(BurstGroupFailureTest, ATimeoutDoesNotBlameAMemberThatStillRuns) {
 }
 
 TEST_F(BurstGroupFailureTest, WhatAMemberFinishedBeforeItEndedCounts) {
-  const Burst done = second->start_burst(1);
+  const Burst done = second.start_burst(1);
   bursts[1].cancel();
   other.drive();
   EXPECT_EQ(done.wait_done(kAtOnce), 3);

@@ -6,16 +6,7 @@
 namespace o80::test {
 namespace {
 
-using ::testing::ElementsAreArray;
-using ::testing::HasSubstr;
-
-class BurstTest : public ManualBackendTest {
- protected:
-  /// Plays a trace of a bursting backend.
-  static void play(const std::string& script) {
-    test::play({.segment = "pair", .bursting = true}, script);
-  }
-};
+using BurstTest = ManualBackendTest;
 
 /// A burst of thousands of millions is under way.
 void wait_until_it_runs(const UntypedFrontend& frontend) {
@@ -37,21 +28,9 @@ TEST_F(BurstTest, RunsExactlyAsManyIterationsAndReturnsTheLastRow) {
 
 // rule G2
 TEST_F(BurstTest, WhatIsSentWithItActsFromItsFirstIteration) {
-  play("0 to 3 over 3; a = burst 2; drive; 0 rows 1: 1 2; b = burst 5; drive; 0 is 3");
-  play(R"(0 to 3; a = burst 4 at 3; drive; 0 rows 1: 0 0 3 3
+  play_bursts("0 to 3 over 3; a = burst 2; drive; 0 rows 1: 1 2; b = burst 5; drive; 0 is 3");
+  play_bursts(R"(0 to 3; a = burst 4 at 3; drive; 0 rows 1: 0 0 3 3
     0 to 5; b = burst 4 at 3; drive; b rejected late; last 4  # what is rejected does not burst)");
-}
-
-TEST_F(BurstTest, GivesAllItsRowsIfAsked) {
-  BurstingBackend bursting;
-  UntypedFrontend frontend("pair");
-  const std::size_t size = frontend.layout().size;
-  std::vector<std::byte> rows(3 * size);
-  frontend.burst(2, kPatience);
-  add(frontend, 0, 3.0, {.pace = iterations(3)});
-  EXPECT_EQ(frontend.burst_rows(rows, kPatience), 5);
-  const Rows expected = frontend.history(3, 5);
-  EXPECT_THAT(rows, ElementsAreArray(expected.bytes));
 }
 
 TEST_F(BurstTest, OfMoreRowsThanTheHistoryKeepsIsAnErrorAtOnce) {
@@ -66,36 +45,35 @@ TEST_F(BurstTest, OfMoreRowsThanTheHistoryKeepsIsAnErrorAtOnce) {
 
 // rule G2
 TEST_F(BurstTest, NothingSentLaterActsInIt) {
-  play(R"(a = burst 3; B: b = 0 to 1; drive; 0 rows 1: 0 0 0; a done 3
+  play_bursts(R"(a = burst 3; B: b = 0 to 1; drive; 0 rows 1: 0 0 0; a done 3
     b taken 4  # while it stands still
     burst 1; 0 is 1)");
 }
 
 TEST_F(BurstTest, TwoFrontendsBurstOneAfterTheOther) {
-  play(R"(0 to 1; a = burst 2; B: 0 to 2; B: b = burst 3; drive; a done 2; b done 5
+  play_bursts(R"(0 to 1; a = burst 2; B: 0 to 2; B: b = burst 3; drive; a done 2; b done 5
     0 rows 1: 1 1 2 2 2)");
 }
 
 TEST_F(BurstTest, StagesAllThatWasSentBeforeIt) {
   std::string many;
   for (int i = 1; i <= 5000; ++i) many += "0 to " + std::to_string(i) + ";";
-  play(many + "a = pulse; B: b = burst 3; drive; a taken 1; 0 rows 1: 1 2 3; last 3");
+  play_bursts(many + "a = pulse; B: b = burst 3; drive; a taken 1; 0 rows 1: 1 2 3; last 3");
 }
 
 // rule G4
 TEST_F(BurstTest, AMovementIsBurstToItsEnd) {
-  play("0 to 1 over 500; 1 to 1 over 700; a = to end; drive; a ended 700; 1 is 1; last 700");
+  play_bursts("0 to 1 over 500; 1 to 1 over 700; a = to end; drive; a ended 700; 1 is 1; last 700");
 }
 
 TEST_F(BurstTest, ABatchThatEndsWithoutMotionNeedsNoIteration) {
-  play(R"(burst 3; purge; a = to end; drive; a completed; last 3
+  play_bursts(R"(burst 3; purge; a = to end; drive; a completed; last 3
     reset 4; b = to end; drive; b ended 4; row 4 fresh; 0 is 4
     c = burst 2; drive; c done 6  # the fresh row was none of them)");
 }
 
 TEST_F(BurstTest, AMovementThatIsInterruptedEndsItsBurstInThatRow) {
-  StartedBackend manual({.segment = "pair", .bursting = true});
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair", .bursting = true});
   add(frontend, 0, 9.0, {.pace = iterations(9)});
   const Batch batch = frontend.pulse_to_end();
   manual.before_publish = [&] {
@@ -116,8 +94,7 @@ TEST_F(BurstTest, AMovementThatIsInterruptedEndsItsBurstInThatRow) {
 
 // rule G1
 TEST_F(BurstTest, OfABackendWithAClockOfItsOwnIsAnErrorAtOnce) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair();
   EXPECT_THAT(message_of<NotBursting>([&] { frontend.burst(1, std::nullopt); }),
               HasSubstr("start it with bursting"));
   const std::pair<UntypedFrontend*, std::int64_t> group[] = {{&frontend, 1}};
@@ -125,7 +102,8 @@ TEST_F(BurstTest, OfABackendWithAClockOfItsOwnIsAnErrorAtOnce) {
 }
 
 TEST_F(BurstTest, OfAFrontendWithoutControlIsRejected) {
-  play(R"(take; a = to end; drive; B: b = burst 1; drive; b done -1; B: 0 to 1; B: c = burst 1
+  play_bursts(
+      R"(take; a = to end; drive; B: b = burst 1; drive; b done -1; B: 0 to 1; B: c = burst 1
     drive; c rejected exclusive; c says has exclusive control; d = burst 1; drive; d done 1)");
 }
 
@@ -153,8 +131,7 @@ TEST_F(BurstTest, OfAGroupLetsAllRunBeforeItWaits) {
 
 TEST_F(BurstTest, ThatIsRejectedBecauseTheBackendEndsSaysWhyItEnded) {
   for (const BackendState state : {BackendState::stopped, BackendState::failed}) {
-    StartedBackend manual({.segment = "pair", .bursting = true});
-    UntypedFrontend frontend("pair");
+    auto [manual, frontend] = StartedPair({.segment = "pair", .bursting = true});
     add(frontend, 0, 1.0);
     const Burst burst = frontend.start_burst(5, {.at = 3});
     ASSERT_EQ(manual.iterate(), Step::run);
@@ -183,27 +160,17 @@ TEST_F(BurstTest, AMovementIsNotCalledEndedWhenTheBackendStopsInIt) {
 }
 
 TEST_F(BurstTest, AFrontendThatDiesInABurstLeavesTheBackendUsable) {
-  // the backend is made after the fork: a child has none of its parent's threads
-  int gate[2];
-  ASSERT_EQ(pipe(gate), 0);
-  ChildProcess child([&](const ChildProcess::Ready& ready) {
-    char byte = 0;
-    if (read(gate[0], &byte, 1) != 1) return;
+  BurstingBackend bursting;
+  StandingProcess child([](const StandingProcess::Stand& stand) {
     UntypedFrontend frontend("pair", {.timeout = kPatience});
     frontend.start_burst(1'000'000'000'000);
     wait_until_it_runs(frontend);
-    ready();
-    pause_for_ever();
+    stand();
   });
-  BurstingBackend bursting;
-  ASSERT_EQ(write(gate[1], "x", 1), 1);
-  ASSERT_TRUE(child.wait_until_ready());
   child.kill_now();
   UntypedFrontend frontend("pair");
   const UntypedObservation row = frontend.burst(3, kPatience);
   EXPECT_EQ(frontend.published(), row.iteration()) << "it stands still again";
-  ::close(gate[0]);
-  ::close(gate[1]);
 }
 
 TEST_F(BurstTest, AStepWithinATimeGivesUpStanding) {
@@ -216,7 +183,7 @@ TEST_F(BurstTest, AStepWithinATimeGivesUpStanding) {
 }
 
 TEST_F(BurstTest, ThatIsCutIsDoneAndTheNextOneBegins) {
-  play("a = burst 100; b = burst 2; run 3; cut; a done 3; drive; b done 5");
+  play_bursts("a = burst 100; b = burst 2; run 3; cut; a done 3; drive; b done 5");
 }
 
 }  // namespace

@@ -1,12 +1,9 @@
 // Purges and control orders wait for nobody, commands older than a purge do not outlive it, and
 // what would keep an iteration too long is refused before it is sent.
 
-#include <gtest/gtest.h>
-
 #include <unistd.h>
 
 #include <fstream>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,7 +11,6 @@
 #include "memory/segment/owned_segment.hpp"
 #include "memory/segment/queue_word.hpp"
 #include "runtime/backend/schedule.hpp"
-#include "runtime/frontend/link.hpp"
 #include "runtime/frontend/loop_state.hpp"
 #include "runtime/hostile_frontend.hpp"
 #include "runtime/trace.hpp"
@@ -22,32 +18,30 @@
 namespace o80::test {
 namespace {
 
-using ::testing::HasSubstr;
-
 using ExpressTraces = ManualBackendTest;
 
 class ExpressTest : public ManualBackendTest {
  protected:
   /// So many frontends, each with as much in its lane as fits.
-  std::vector<std::unique_ptr<UntypedFrontend>> flood(std::size_t count) {
-    std::vector<std::unique_ptr<UntypedFrontend>> frontends;
+  std::vector<UntypedFrontend> flood(std::size_t count) {
+    std::vector<UntypedFrontend> frontends;
     for (std::size_t i = 0; i < count; ++i) {
-      frontends.push_back(std::make_unique<UntypedFrontend>("pair"));
+      frontends.emplace_back("pair");
       for (int command = 0; command < 16'300; ++command) {
-        add(*frontends.back(), 0, 1.0, {.pace = iterations(1'000'000)});
+        add(frontends.back(), 0, 1.0, {.pace = iterations(1'000'000)});
       }
-      floods.push_back(frontends.back()->pulse());
+      floods.push_back(frontends.back().pulse());
     }
     return frontends;
   }
 
   StartedBackend manual;
+  UntypedFrontend one{"pair"};
   std::vector<Batch> floods;
 };
 
 // rule B8
 TEST_F(ExpressTest, APurgeIsTakenInTheIterationAfterItsCommitWhateverLiesInOtherLanes) {
-  UntypedFrontend one("pair");
   const Batch moving = send(one, 0, 9.0, {.pace = iterations(1000)});
   manual.run(3);
   const auto others = flood(7);
@@ -76,7 +70,6 @@ TEST_F(ExpressTest, APurgeIsTakenInTheIterationAfterItsCommitWhateverLiesInOther
 }
 
 TEST_F(ExpressTest, NamesTheFrontendWhoseBatchesOthersWaitFor) {
-  UntypedFrontend one("pair");
   send(one, 1, 1.0);
   manual.run(1);
   EXPECT_EQ(queue_holder(one.link()->segment.view()), std::nullopt);
@@ -88,7 +81,7 @@ TEST_F(ExpressTest, NamesTheFrontendWhoseBatchesOthersWaitFor) {
 
   const std::optional<QueueHolder> holder = queue_holder(one.link()->segment.view());
   ASSERT_TRUE(holder.has_value());
-  EXPECT_EQ(holder->lane, others[0]->link()->lane()->lane());
+  EXPECT_EQ(holder->lane, others[0].link()->lane()->lane());
   EXPECT_EQ(holder->since, begun);
   std::string program;
   std::ifstream("/proc/self/comm") >> program;
@@ -127,7 +120,6 @@ TEST_F(ExpressTest, TheHolderOfTheQueueIsTheLaneThatDoesMostOfTheWork) {
 }
 
 TEST_F(ExpressTest, ControlIsTakenAtOnceToo) {
-  UntypedFrontend one("pair");
   send(one, 1, 1.0);
   manual.run(1);
   const auto others = flood(7);
@@ -144,7 +136,6 @@ TEST_F(ExpressTest, ControlIsTakenAtOnceToo) {
 }
 
 TEST_F(ExpressTest, ControlIsNotLetGoOfBeforeWhatWasSentUnderIt) {
-  UntypedFrontend one("pair");
   one.add_take_control();
   one.pulse();
   manual.run(1);
@@ -159,7 +150,6 @@ TEST_F(ExpressTest, ControlIsNotLetGoOfBeforeWhatWasSentUnderIt) {
 }
 
 TEST_F(ExpressTest, AResumeWaitsForWhatWasSentBeforeIt) {
-  UntypedFrontend one("pair");
   const std::uint64_t number = one.halt("stop");
   manual.run(1);
   const auto others = flood(7);
@@ -186,7 +176,6 @@ TEST_F(ExpressTraces, WhoMayCommandIsDecidedWhenABatchActs) {
 // ------------------------------------------------------------------------------ refused in pulse
 
 TEST_F(ExpressTest, MoreRequestsOrOrdersThanABatchMayHaveAreRefused) {
-  UntypedFrontend one("pair");
   for (std::uint32_t i = 0; i < kMaxRequests + 1; ++i) add_request<Snapshot>(one);
   EXPECT_THAT(message_of<InvalidArgument>([&] { one.pulse(); }),
               AllOf(HasSubstr("at most 8 requests, this one has 9"), HasSubstr("several pulses")));
@@ -197,7 +186,6 @@ TEST_F(ExpressTest, MoreRequestsOrOrdersThanABatchMayHaveAreRefused) {
 }
 
 TEST_F(ExpressTest, MoreBatchesThanMayWaitForLaterIterationsAreRefused) {
-  UntypedFrontend one("pair");
   const auto pulse_at = [&](Iteration at) {
     add(one, 0, 1.0);
     return one.pulse({.at = at});
@@ -224,16 +212,13 @@ TEST_F(ExpressTest, ABackendRejectsWhatASenderPutsIntoItsScheduleBeyondThat) {
   for (std::uint32_t i = 0; i < kMaxScheduledAt + 1; ++i) {
     BatchBuilder batch;
     batch.purge(0);
-    const CommandId id = hostile.sender().next_id();
-    hostile.sender().draw_ids(id + 3);
-    hostile.send(batch, {.id = id, .at = 50});
-    ids.push_back(id);
+    ids.push_back(hostile.draw_id());
+    hostile.send(batch, {.id = ids.back(), .at = 50});
   }
   manual.run(60);
-  const auto word = [&](CommandId id) { return hostile.sender().status(id).word; };
-  EXPECT_EQ(static_cast<Status>(word(ids.front()).status), Status::active);
-  EXPECT_EQ(static_cast<Status>(word(ids.back()).status), Status::rejected);
-  EXPECT_EQ(static_cast<Reason>(word(ids.back()).reason), Reason::full);
+  EXPECT_EQ(hostile.status(ids.front()), Status::active);
+  EXPECT_EQ(hostile.status(ids.back()), Status::rejected);
+  EXPECT_EQ(static_cast<Reason>(hostile.sender().status(ids.back()).word.reason), Reason::full);
 }
 
 TEST_F(ExpressTraces, ABatchThatCannotBeTakenAtItsIterationIsLateUnlessItMayActInALaterOne) {
@@ -253,7 +238,7 @@ TEST_F(ExpressTraces, ABatchThatCannotBeTakenAtItsIterationIsLateUnlessItMayActI
 
 TEST_F(ExpressTest, APurgeAlwaysHasIdsHoweverNarrowTheGapsBetweenThoseInUse) {
   StartedBackend bursting({.segment = "bursting", .bursting = true, .lane_blocks = 1024});
-  UntypedFrontend one("bursting");
+  one = UntypedFrontend("bursting");
   // long commands and bursts in turn leave gaps of ids two wide
   std::vector<Batch> running;
   try {

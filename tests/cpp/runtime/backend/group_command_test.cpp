@@ -1,19 +1,12 @@
 // One command for several actuators, as a frontend adds it and a backend carries it out.
 
-#include <gtest/gtest.h>
-
 #include <array>
 #include <vector>
 
-#include "runtime/manual_backend.hpp"
 #include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 constexpr std::array<std::uint32_t, 2> kBoth{0, 1};
 
@@ -32,8 +25,7 @@ TEST_F(GroupCommandTest, IsOneRecordWithOneStatus) {
 }
 
 TEST_F(GroupCommandTest, ATrajectoryIsOneToo) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair();
   const std::array<double, 6> rows{1, 2, 3, 10, 20, 30};
   frontend.add_trajectories(kBoth, 3, std::as_bytes(std::span(rows)));
   const Batch batch = frontend.pulse();
@@ -45,10 +37,9 @@ TEST_F(GroupCommandTest, ATrajectoryIsOneToo) {
 }
 
 TEST_F(GroupCommandTest, IsRefusedWholeWithTheReason) {
-  StartedBackend manual({.segment = "pair"}, [](Schema& schema) {
+  auto [manual, frontend] = StartedPair({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(1).limits({.minimum = -1, .maximum = 1, .speed = 10});
   });
-  UntypedFrontend frontend("pair");
   const auto refusal = [&](std::vector<std::uint32_t> actuators, std::vector<double> targets,
                            const CommandOptions& options = {.pace = iterations(2)}) {
     return message_of<InvalidArgument>(
@@ -69,10 +60,9 @@ TEST_F(GroupCommandTest, IsRefusedWholeWithTheReason) {
 
 // rule C13
 TEST_F(GroupCommandTest, MovesSmoothlyIfOneOfItsActuatorsDoesByDefault) {
-  StartedBackend manual({.segment = "pair"}, [](Schema& schema) {
+  auto [manual, frontend] = StartedPair({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(1).limits({.speed = 1e6, .acceleration = 1e9});
   });
-  UntypedFrontend frontend("pair");
   add_both(frontend, 1.0, 1.0, {.pace = iterations(4)});
   frontend.pulse();
   manual.run(4);
@@ -81,8 +71,7 @@ TEST_F(GroupCommandTest, MovesSmoothlyIfOneOfItsActuatorsDoesByDefault) {
 }
 
 TEST_F(GroupCommandTest, FillsItsLaneAsItsBlocksSay) {
-  StartedBackend manual({.segment = "pair", .lane_blocks = 64});
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair", .lane_blocks = 64});
   // a block for the batch, then three for each: its head and two members
   for (int i = 0; i < 20; ++i) add_both(frontend, i, i);
   EXPECT_THAT(message_of<LaneFull>([&] { frontend.pulse(); }), HasSubstr("takes 61 blocks"));
@@ -143,8 +132,7 @@ TEST_F(GroupCommandTest, EndsWithItsFrontendIfToldSo) {
 // ------------------------------------------------------------------------------ bursting
 
 TEST_F(GroupCommandTest, ABurstUntilItsEndRunsUntilItsLastMemberHasEnded) {
-  play({.segment = "pair", .bursting = true},
-       "0 to 3 over 3; 0,1 to 4 2 over 2; a = to end; drive; a ended 5; last 5");
+  play_bursts("0 to 3 over 3; 0,1 to 4 2 over 2; a = to end; drive; a ended 5; last 5");
 }
 
 TEST_F(GroupCommandTest, BeginsAtTheSameIterationHoweverLongTheBackendStoodBefore) {
@@ -152,9 +140,8 @@ TEST_F(GroupCommandTest, BeginsAtTheSameIterationHoweverLongTheBackendStoodBefor
   std::string many;
   for (int i = 0; i < 5000; ++i) many += "1 to 1 over 1e6;";
   for (const std::string stands : {"", "drive;"}) {
-    play({.segment = "pair", .bursting = true},
-         many + "0,1 to 5 5; a = pulse; burst 20; b = purge 1;" + stands + "burst 20;" + stands +
-             "0 rows 20: 0 5");
+    play_bursts(many + "0,1 to 5 5; a = pulse; burst 20; b = purge 1;" + stands + "burst 20;" +
+                stands + "0 rows 20: 0 5");
   }
 }
 

@@ -1,7 +1,5 @@
 // Which backends start halted because of how their predecessor ended.
 
-#include <gmock/gmock.h>
-
 #include <optional>
 
 #include "memory/child_process.hpp"
@@ -10,15 +8,13 @@
 namespace o80::test {
 namespace {
 
-using ::testing::HasSubstr;
 using HaltSuccessorTest = ManualBackendTest;
 
 enum class Before { idle, acting, halted, requested, resumed, stopped, failed };
 
 /// Leaves a backend in some state and dies.
-void live_and_die(Before before, const ChildProcess::Ready& ready, bool bursting = false) {
-  StartedBackend manual({.segment = "pair", .bursting = bursting});
-  UntypedFrontend frontend("pair");
+void live_and_die(Before before, const StandingProcess::Stand& stand, bool bursting = false) {
+  auto [manual, frontend] = StartedPair({.segment = "pair", .bursting = bursting});
   const auto iterate = [&] {
     if (bursting) frontend.start_burst(1);
     manual.iterate();
@@ -41,18 +37,13 @@ void live_and_die(Before before, const ChildProcess::Ready& ready, bool bursting
   if (before == Before::requested) frontend.halt("me");
   if (before == Before::stopped) manual.backend.end(BackendState::stopped);
   if (before == Before::failed) manual.backend.end(BackendState::failed, "broken");
-  ready();
-  pause_for_ever();
+  stand();
 }
 
 std::optional<Halt> halt_of_successor(Before before, BackendOptions options = {.segment = "pair"},
                                       bool was_bursting = false) {
-  ChildProcess child(
-      [&](const ChildProcess::Ready& ready) { live_and_die(before, ready, was_bursting); });
-  EXPECT_TRUE(child.wait_until_ready());
-  child.kill_now();
-  StartedBackend manual(options);
-  UntypedFrontend frontend("pair");
+  StandingProcess([&](const auto& stand) { live_and_die(before, stand, was_bursting); }).kill_now();
+  auto [manual, frontend] = StartedPair(options);
   const auto halt = frontend.halted();
   EXPECT_EQ(frontend.wait_for(0, kAtOnce).head().halted, halt ? 1U : 0U);
   if (halt) {
@@ -82,16 +73,12 @@ TEST_F(HaltSuccessorTest, OfAHaltedBackendStartsHalted) {
 }
 
 TEST_F(HaltSuccessorTest, OfAHaltedBackendWithoutARowStartsHaltedToo) {
-  ChildProcess child(
-      [&](const ChildProcess::Ready& ready) { live_and_die(Before::halted, ready); });
-  ASSERT_TRUE(child.wait_until_ready());
-  child.kill_now();
+  StandingProcess([](const auto& stand) { live_and_die(Before::halted, stand); }).kill_now();
   // this one does not live to publish a row
-  StandingProcess second([&](const StandingProcess::Stand& stand) {
+  StandingProcess([](const auto& stand) {
     ManualBackend manual;
     stand();
-  });
-  second.kill_now();
+  }).kill_now();
   StartedBackend manual;
   EXPECT_TRUE(UntypedFrontend("pair").halted());
 }

@@ -1,22 +1,12 @@
 // Halts at iteration level: when they act, what they end and what is refused.
 
-#include <gmock/gmock.h>
-
-#include "control/sending/batch_builder.hpp"
-#include "o80/base/error.hpp"
-#include "runtime/manual_backend.hpp"
+#include "runtime/hostile_frontend.hpp"
 #include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 using HaltTest = ManualBackendTest;
-
-std::uint32_t halted_in_row(const UntypedFrontend& frontend, Iteration k) {
-  return frontend.wait_for(k, kAtOnce).head().halted;
-}
 
 // rules H3, H6
 TEST_F(HaltTest, ActsInTheFirstStepBegunAfterIt) {
@@ -61,37 +51,25 @@ TEST_F(HaltTest, EndsWhatWasSentBeforeItWhereverItIs) {
 }
 
 TEST_F(HaltTest, WhatWasSentBeforeItNeverActsAlsoAfterTheResume) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
-  BatchBuilder late;
+  auto [manual, frontend] = StartedPair();
   send(frontend, 1, 0.0);
   frontend.halt("");
   manual.run(1);
   // drawn before the halt acts, committed long after
-  AttachedSegment segment =
-      AttachedSegment::attach("pair", Access::read_write, Deadline(kPatience));
-  LaneSender sender(segment);
-  RecordHead head;
-  head.pace = Pace::direct;
-  const double target = 4.0;
-  late.command(head, std::as_bytes(std::span(&target, 1)));
-  BatchRecord record;
-  record.id = sender.next_id();
-  sender.draw_ids(record.id + 3);
-  frontend.forget_added();
+  HostileFrontend sender;
+  const CommandId id = sender.draw_id();
   const Batch resumed = send_resume(frontend, 1);
   manual.run(1);
   EXPECT_EQ(resumed.handle(0).status, Status::completed) << resumed.handle(0).text;
   EXPECT_FALSE(frontend.halted());
-  const auto blocks = late.seal(record);
-  sender.send(std::as_bytes(blocks), offsetof(BatchRecord, ticket));
+  sender.command(4.0, {.id = id});
   // as if its ticket had been drawn before the halt
   const std::uint64_t early = 0;
-  auto* words = reinterpret_cast<std::uint64_t*>(segment.view().transport(sender.lane()));
+  const auto lane = sender.sender().lane();
+  auto* words = reinterpret_cast<std::uint64_t*>(sender.view().transport(lane));
   std::atomic_ref(words[offsetof(BatchRecord, ticket) / 8]).store(early);
   manual.run(2);
-  EXPECT_EQ(static_cast<Status>(sender.status(record_id(record.id, 0)).word.status),
-            Status::halted);
+  EXPECT_EQ(sender.status(record_id(id, 0)), Status::halted);
   EXPECT_EQ(desired(frontend.latest()), 0.0);
 }
 
@@ -111,7 +89,7 @@ TEST_F(HaltTest, IsLatchedBeforeRowZero) {
   halt("pair", "not today", kPatience);
   manual.start();
   UntypedFrontend frontend("pair");
-  EXPECT_EQ(halted_in_row(frontend, 0), 1U);
+  EXPECT_EQ(frontend.latest().head().halted, 1U);
   ASSERT_TRUE(frontend.halted());
   EXPECT_EQ(frontend.halted()->reason(), "not today");
 }
@@ -150,8 +128,6 @@ TEST_F(HaltTest, AReadingThatIsNoNumberHaltsWhereThereIsAnErrorLimit) {
 }
 
 // ------------------------------------------------------------------------------ bursts
-
-void play_bursts(const std::string& script) { play({.segment = "pair", .bursting = true}, script); }
 
 // rule H5
 TEST_F(HaltTest, AHaltEndsABurstAfterTheIterationUnderWay) {

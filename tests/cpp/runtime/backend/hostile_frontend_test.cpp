@@ -1,20 +1,15 @@
 // An owner of a lane that lies about itself and its predecessors: the next owners have an ordinary
 // lane.
 
-#include <gmock/gmock.h>
-
 #include <memory>
 #include <thread>
 
 #include "memory/child_process.hpp"
 #include "runtime/hostile_frontend.hpp"
-#include "runtime/manual_backend.hpp"
 #include "runtime/shared_scene.hpp"
 
 namespace o80::test {
 namespace {
-
-using ::testing::HasSubstr;
 
 /// What an owner of a lane may have written about itself and its predecessors.
 struct SelfDescription {
@@ -56,6 +51,16 @@ class LyingOwnerTest : public ManualBackendTest {
     ASSERT_EQ(other_->link()->lane()->lane(), 1U);
     manual_.run(1);
   }
+  /// After a life with each lie, which the backend has seen or not.
+  void leaves_an_ordinary_lane(const std::function<void(const SelfDescription&, bool)>& live) {
+    for (const bool seen : {false, true})
+      for (const SelfDescription& lie : kLies) {
+        SCOPED_TRACE(::testing::Message() << lie.incarnation << (seen ? ", seen" : ""));
+        live(lie, seen);
+        expect_an_ordinary_lane();
+        if (HasFatalFailure()) return;
+      }
+  }
   /// The next owners of lane 0: each is served, keeps its control, is known to have closed or died.
   void expect_an_ordinary_lane() {
     UntypedFrontend next("pair");
@@ -93,45 +98,32 @@ class LyingOwnerTest : public ManualBackendTest {
 };
 
 TEST_F(LyingOwnerTest, ThatClosesLeavesAnOrdinaryLane) {
-  for (const bool seen : {false, true})
-    for (const SelfDescription& lie : kLies) {
-      SCOPED_TRACE(::testing::Message() << lie.incarnation << (seen ? ", seen" : ""));
-      {
-        HostileFrontend hostile;
-        honest_frontend_comes();
-        lie.write(hostile.page());
-        if (seen) manual_.run(2);
-        hostile.leave();
-        lie.write(hostile.page());
-      }
-      expect_an_ordinary_lane();
-      if (HasFatalFailure()) return;
-    }
+  leaves_an_ordinary_lane([&](const SelfDescription& lie, bool seen) {
+    HostileFrontend hostile;
+    honest_frontend_comes();
+    lie.write(hostile.page());
+    if (seen) manual_.run(2);
+    hostile.leave();
+    lie.write(hostile.page());
+  });
 }
 
 TEST_F(LyingOwnerTest, ThatDiesLeavesAnOrdinaryLane) {
-  for (const bool seen : {false, true})
-    for (const SelfDescription& lie : kLies) {
-      SCOPED_TRACE(::testing::Message() << lie.incarnation << (seen ? ", seen" : ""));
-      {
-        const SharedScene scene;
-        ChildProcess hostile([&](const ChildProcess::Ready& ready) {
-          HostileFrontend own;
-          ready();
-          while (!scene->over) std::this_thread::yield();
-          lie.write(own.page());
-          ++scene->scribbles;
-          pause_for_ever();
-        });
-        ASSERT_TRUE(hostile.wait_until_ready());
-        honest_frontend_comes();
-        scene->over = true;
-        while (scene->scribbles == 0) std::this_thread::yield();
-        if (seen) manual_.run(2);
-      }
-      expect_an_ordinary_lane();
-      if (HasFatalFailure()) return;
-    }
+  leaves_an_ordinary_lane([&](const SelfDescription& lie, bool seen) {
+    const SharedScene scene;
+    ReadyProcess hostile([&](const ChildProcess::Ready& ready) {
+      HostileFrontend own;
+      ready();
+      while (!scene->over) std::this_thread::yield();
+      lie.write(own.page());
+      ++scene->scribbles;
+      pause_for_ever();
+    });
+    honest_frontend_comes();
+    scene->over = true;
+    while (scene->scribbles == 0) std::this_thread::yield();
+    if (seen) manual_.run(2);
+  });
 }
 
 }  // namespace

@@ -1,27 +1,19 @@
 // A frontend that writes garbage wherever it can: the loop goes on, within its limits, and others
 // are served.
 
-#include <gmock/gmock.h>
-
 #include <atomic>
 #include <cmath>
-#include <cstddef>
 #include <limits>
 #include <random>
 #include <thread>
 
-#include "control/sending/batch_builder.hpp"
 #include "memory/child_process.hpp"
-#include "memory/ring/lane_sender.hpp"
 #include "memory/segment/segment_name.hpp"
 #include "runtime/hostile_frontend.hpp"
-#include "runtime/manual_backend.hpp"
 #include "runtime/shared_scene.hpp"
 
 namespace o80::test {
 namespace {
-
-using ::testing::HasSubstr;
 
 class HostileTest : public ManualBackendTest {};
 
@@ -63,9 +55,8 @@ void scribble_until_over(const SharedScene& scene, std::uint64_t seed,
 TEST_F(HostileTest, AnotherFrontendCommandsWhileOneScribblesInItsLaneWithoutEnd) {
   Watched watched({.segment = "pair", .lane_blocks = 64});
   const SharedScene scene;
-  ChildProcess hostile(
+  ReadyProcess hostile(
       [&](const ChildProcess::Ready& ready) { scribble_until_over(scene, 1, ready); });
-  ASSERT_TRUE(hostile.wait_until_ready());
   UntypedFrontend good("pair");
 
   // by chance the hostile frontend purges or overwrites what others sent, as any frontend may:
@@ -114,9 +105,8 @@ TEST_F(HostileTest, AnotherFrontendCommandsWhileOneScribblesInItsLaneWithoutEnd)
 TEST_F(HostileTest, BurstsOfAnotherFrontendAreRunWhileOneScribbles) {
   BurstingBackend bursting;
   const SharedScene scene;
-  ChildProcess hostile(
+  ReadyProcess hostile(
       [&](const ChildProcess::Ready& ready) { scribble_until_over(scene, 2, ready); });
-  ASSERT_TRUE(hostile.wait_until_ready());
   UntypedFrontend good("pair");
   Iteration last = 0;
   for (int i = 0; i < 200; ++i) {
@@ -235,7 +225,7 @@ TEST_F(HostileTest, ABackendThatStandsStillHearsOfABurstWhoseBellWasPutBack) {
 TEST_F(HostileTest, ControlFallsWithADeadHolderWhateverItWroteAboutItself) {
   StartedBackend manual;
   const SharedScene scene;
-  ChildProcess holder([&](const ChildProcess::Ready& ready) {
+  ReadyProcess holder([&](const ChildProcess::Ready& ready) {
     HostileFrontend own;
     BatchBuilder builder;
     builder.take_control();
@@ -246,7 +236,6 @@ TEST_F(HostileTest, ControlFallsWithADeadHolderWhateverItWroteAboutItself) {
     ++scene->scribbles;
     pause_for_ever();
   });
-  ASSERT_TRUE(holder.wait_until_ready());
   UntypedFrontend good("pair");
   manual.run(1);
   ++scene->scribbles;
@@ -267,11 +256,7 @@ TEST_F(HostileTest, IdsByLeapsAreRefusedAndTheNextOwnerOfTheLaneIsToldTheTruth) 
   {
     HostileFrontend hostile;
     const auto send_with_id = [&](std::uint64_t id) {
-      BatchBuilder builder;
-      RecordHead head;
-      const double target = 0.5;
-      builder.command(head, std::as_bytes(std::span(&target, 1)));
-      hostile.send(builder, {.id = id});
+      hostile.command(0.5, {.id = id});
       manual.run(1);
       return hostile.sender().status(id).known == LaneSender::Known::yes;
     };

@@ -8,45 +8,21 @@ namespace {
 
 class KillTest : public ManualBackendTest {};
 
-/// A frontend in a process of its own that sends a long movement and takes control.
-class Commander {
- public:
-  Commander() {
-    if (pipe(gate_) != 0) throw Error("no pipe");
-    child_.emplace([this](const ChildProcess::Ready& ready) {
-      char byte = 0;
-      if (read(gate_[0], &byte, 1) != 1) return;
-      UntypedFrontend frontend("pair", {.timeout = kPatience});
-      frontend.add_take_control();
-      add(frontend, 0, 1e6, {.pace = iterations(1'000'000)});
-      frontend.pulse();
-      add(frontend, 1, 1.0);
-      frontend.pulse({.at = 500'000});
-      ready();
-      pause_for_ever();
-    });
-  }
-  Commander& operator=(Commander&&) = delete;
-  ~Commander() {
-    ::close(gate_[0]);
-    ::close(gate_[1]);
-  }
-  void command() {
-    ASSERT_EQ(write(gate_[1], "x", 1), 1);
-    ASSERT_TRUE(child_->wait_until_ready());
-  }
-  void kill_now() { child_->kill_now(); }
-
- private:
-  int gate_[2];
-  std::optional<ChildProcess> child_;
-};
+/// Takes control, sends a long movement, and a command for later.
+void command(const StandingProcess::Stand& stand) {
+  UntypedFrontend frontend("pair", {.timeout = kPatience});
+  frontend.add_take_control();
+  add(frontend, 0, 1e6, {.pace = iterations(1'000'000)});
+  frontend.pulse();
+  add(frontend, 1, 1.0);
+  frontend.pulse({.at = 500'000});
+  stand();
+}
 
 // rule W5
 TEST_F(KillTest, TheBackendGoesOnWhenACommandingFrontendIsKilledAndTheNextOneCommands) {
-  Commander commander;
   StartedBackend manual({.segment = "pair", .lanes = 1});
-  commander.command();
+  StandingProcess commander(command);
   manual.run(3);
   commander.kill_now();
   UntypedFrontend next("pair");
@@ -62,10 +38,9 @@ TEST_F(KillTest, TheBackendGoesOnWhenACommandingFrontendIsKilledAndTheNextOneCom
 TEST_F(KillTest, ADeadCommanderPurgesHaltsOrStopsAsToldSo) {
   for (const Stale stale : {Stale::purge, Stale::halt, Stale::stop}) {
     SCOPED_TRACE(static_cast<int>(stale));
-    Commander commander;
     StartedBackend manual({.segment = "pair", .stale = stale});
     UntypedFrontend reader("pair");
-    commander.command();
+    StandingProcess commander(command);
     manual.run(3);
     EXPECT_TRUE(reader.latest().active(0));
     commander.kill_now();

@@ -1,7 +1,5 @@
 #include "runtime/backend/overrun_limit.hpp"
 
-#include <gmock/gmock.h>
-
 #include "runtime/manual_backend.hpp"
 
 namespace o80::test {
@@ -28,8 +26,7 @@ TEST(OverrunLimit, OfNoneIsNeverExceeded) {
 using OverrunLimitTest = ManualBackendTest;
 
 TEST_F(OverrunLimitTest, HaltsTheBackend) {
-  StartedBackend manual({.segment = "pair", .max_overruns = 2});
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair", .max_overruns = 2});
   manual.backend.set_timing({.lateness = 5, .overruns = 1});
   manual.backend.set_timing({.lateness = 0, .overruns = 1});
   manual.run(1);

@@ -1,21 +1,16 @@
 // Which readings an embedded backend begins with, and those of actuators that follow.
 
-#include <gmock/gmock.h>
-
 #include <cmath>
 #include <limits>
 #include <random>
 
 #include "cases.hpp"
 #include "o80/runtime/typed_backend.hpp"
-#include "runtime/manual_backend.hpp"
 #include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 using EmbeddedReadingTest = ManualBackendTest;
 using FollowerTest = ManualBackendTest;
 
@@ -200,69 +195,33 @@ TEST_F(FollowerTest, IsCommandedOnlyFromWhereItCanBe) {
   }
 }
 
+/// Plays a trace of a pair whose shoulder follows.
+void play_following(const std::string& script) {
+  play({.segment = "pair", .period = 1'000'000}, script, [](Schema& schema) {
+    schema.actuator(0).limits({.speed = 2.0, .noise = 0.03}).when_idle(WhenIdle::follow);
+  });
+}
+
 TEST_F(FollowerTest, OneTurnOffInEveryRowIsAcceptedByAResumeOnly) {
-  Follower follower({.speed = 2.0, .noise = 0.03});
-  UntypedFrontend frontend("pair");
-  follower.run(3);
-  follower.offset = 6.283e5;
-  follower.run(5);
-  const Batch refused = send(frontend, 0, 6.283e5, {.pace = iterations(5)});
-  follower.run(1);
-  EXPECT_EQ(refused.handle(0).reason, Reason::reading);
-  const std::uint64_t number = frontend.halt("");
-  follower.run(3);
-  const Batch resumed = send_resume(frontend, number, true);
-  follower.run(1);
-  ASSERT_EQ(resumed.handle(0).status, Status::completed) << resumed.handle(0).text;
-  const Batch taken = send(frontend, 0, 6.283e5, {.pace = iterations(5)});
-  follower.run(6);
-  EXPECT_EQ(taken.handle(0).status, Status::completed) << taken.handle(0).text;
+  play_following(R"(run 3; in 4 read 0 6.283e5; run 5; a = 0 to 6.283e5 over 5; run 1
+    a rejected reading; halt; run 3; r = resume 1 accepting; run 1; r completed
+    0 is 6.283e5; b = 0 to 6.283e5 over 5; run 6; b completed)");
 }
 
 TEST_F(FollowerTest, OfACommandOfSeveralIsJudgedWhenTheyBegin) {
-  constexpr std::array<std::uint32_t, 2> kBoth{0, 1};
-  constexpr std::array<double, 2> kTargets{0.004, 2.0};
-  for (const double wrong : {0.0, 1e5, -1e300, kInfinity, std::nan("")}) {
+  for (const std::string wrong : {"0", "1e5", "-1e300", "inf", "nan"}) {
     for (const bool while_waiting : {true, false}) {
-      Follower follower({.speed = 2.0, .noise = 0.03});
-      UntypedFrontend frontend("pair");
-      follower.run(3);
-      add(frontend, 1, 1.0, {.pace = iterations(10)});
-      frontend.add_commands(kBoth, std::as_bytes(std::span(kTargets)), {.pace = iterations(5)});
-      add(frontend, 0, 0.0, {.pace = iterations(5)});
-      const Batch batch = frontend.pulse();
-      follower.run(4);
-      if (while_waiting) {
-        // it has come back when they begin
-        follower.offset = wrong;
-        follower.run(1);
-        follower.offset = 0.0;
-        follower.run(5);
-      } else {
-        follower.run(5);
-        follower.offset = wrong;
-        follower.run(1);
-      }
-      EXPECT_EQ(batch.handle(0).status, Status::completed);
-      EXPECT_EQ(batch.handle(1).status, Status::queued);
-      follower.offset = 0.0;
-      follower.run(1);
-      const bool begins = while_waiting || wrong == 0.0;
-      EXPECT_EQ(follower.written == 0.0008, begins) << wrong << while_waiting;
-      follower.run(400);
-      for (const std::size_t place : {std::size_t{1}, std::size_t{2}}) {
-        const Handle handle = batch.handle(place);
-        EXPECT_EQ(handle.status, begins ? Status::completed : Status::interrupted) << wrong;
-        EXPECT_EQ(handle.reason, begins ? Reason::none : Reason::reading);
-        if (begins) continue;
-        EXPECT_THAT(handle.text, place == 1
-                                     ? AllOf(HasSubstr("actuator 'shoulder' was read at"),
-                                             HasSubstr("resume with --accept-reading"))
-                                     : AllOf(HasSubstr("an implausible reading ended all commands"),
-                                             HasSubstr("of its actuator")));
-      }
-      EXPECT_EQ(unpack<double>(follower.backend.desired() + sizeof(double)), 2.0)
-          << "the others go on";
+      // in one row, the last one before they begin or an earlier one
+      const int row = while_waiting ? 8 : 13;
+      const bool begins = while_waiting || wrong == "0";
+      play_following("run 3; 1 to 1 over 10; 0,1 to 0.004 2 over 5; 0 to 0 over 5; b = pulse; in " +
+                     std::to_string(row) + " read 0 " + wrong + "; in " + std::to_string(row + 1) +
+                     " read 0 0; run 10; b completed; b.1 queued; run 1;" +
+                     (begins ? "0 is 0.0008; run 400; b.1 completed none; b.2 completed none"
+                             : R"(run 400; b.1 interrupted reading; b.2 interrupted reading
+          b.1 says actuator 'shoulder' was read at; b.1 says resume with --accept-reading
+          b.2 says an implausible reading ended all commands; b.2 says of its actuator)") +
+                     "; 1 is 2  # the others go on");
     }
   }
 }

@@ -1,20 +1,14 @@
 // How a halt is cleared, and what is served until then.
 
-#include <gmock/gmock.h>
-
 #include <atomic>
 #include <cmath>
 #include <thread>
 
-#include "control/sending/batch_builder.hpp"
-#include "o80/base/error.hpp"
-#include "runtime/manual_backend.hpp"
 #include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
 
-using ::testing::HasSubstr;
 using ResumeTest = ManualBackendTest;
 
 void limit_shoulder(Schema& schema) {
@@ -60,14 +54,16 @@ TEST_F(ResumeTest, NamesAHaltHoweverSoonItIsSent) {
        limit_shoulder);
 }
 
-/// A shoulder that needs ten iterations to rest.
-struct Moving {
-  Moving() {
+/// A halt in iteration 21 of a shoulder that needs ten iterations to rest.
+class MovingTest : public ManualBackendTest {
+ protected:
+  MovingTest() {
     send(frontend, 0, 1e6, {.pace = speed(100.0), .profile = Profile::linear});
     manual.run(20);
+    number = frontend.halt("");
   }
   /// What it says, while another thread iterates.
-  std::string resume(std::uint64_t number, const KeepWaiting& keep_waiting = {}) {
+  std::string resume(const KeepWaiting& keep_waiting = {}) {
     std::atomic<bool> over{false};
     std::thread loop([&] {
       while (!over) {
@@ -84,14 +80,11 @@ struct Moving {
 
   StartedBackend manual{{.segment = "pair"}, limit_shoulder};
   UntypedFrontend frontend{"pair"};
+  std::uint64_t number = 0;
 };
 
-TEST_F(ResumeTest, OfAFrontendWaitsUntilTheRobotRests) {
-  Moving moving;
-  UntypedFrontend& frontend = moving.frontend;
-  const std::uint64_t number = frontend.halt("the ball is on the floor");
-  const std::string refused = moving.resume(number);
-  EXPECT_EQ(refused, "");
+TEST_F(MovingTest, IsWaitedForByAResume) {
+  EXPECT_EQ(resume(), "");
   EXPECT_FALSE(frontend.halted());
   double before = 0.1;
   Iteration k = 21;
@@ -104,22 +97,15 @@ TEST_F(ResumeTest, OfAFrontendWaitsUntilTheRobotRests) {
   EXPECT_GE(k, 30) << "it takes ten iterations to rest";
 }
 
-TEST_F(ResumeTest, OfAFrontendCanBeCalledOffHoweverFastRowsCome) {
-  Moving moving;
-  UntypedFrontend& frontend = moving.frontend;
-  const std::uint64_t number = frontend.halt("");
-  const std::string refused = moving.resume(number, []() -> bool { throw Error("Ctrl-C"); });
-  EXPECT_EQ(refused, "Ctrl-C");
+TEST_F(MovingTest, AResumeCanBeCalledOffHoweverFastRowsCome) {
+  EXPECT_EQ(resume([]() -> bool { throw Error("Ctrl-C"); }), "Ctrl-C");
   EXPECT_TRUE(frontend.halted());
 }
 
-TEST_F(ResumeTest, OfAFrontendSaysWhatItWaitsFor) {
-  Moving moving;
-  UntypedFrontend& frontend = moving.frontend;
-  const std::uint64_t number = frontend.halt("");
+TEST_F(MovingTest, AResumeSaysWhatItWaitsFor) {
   EXPECT_THAT(message_of<TimeoutError>([&] { frontend.resume(number, kAtOnce); }),
               HasSubstr("is not in force yet"));
-  moving.manual.run(1);
+  manual.run(1);
   EXPECT_THAT(message_of<TimeoutError>([&] { frontend.resume(number, kAtOnce); }),
               HasSubstr("still brakes"));
 }

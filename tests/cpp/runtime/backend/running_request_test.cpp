@@ -1,7 +1,5 @@
 // Requests that take time: answered with `running`, ended some iterations later.
 
-#include <gmock/gmock.h>
-
 #include "memory/child_process.hpp"
 #include "o80/runtime/typed_backend.hpp"
 #include "runtime/trace.hpp"
@@ -9,7 +7,6 @@
 namespace o80::test {
 namespace {
 
-using ::testing::HasSubstr;
 using RunningRequestTest = ManualBackendTest;
 
 /// A request that runs since iteration 1.
@@ -31,8 +28,7 @@ TEST_F(RunningRequestTest, ShowsItsProgressToItsSenderAndToObservers) {
   play(R"(a = home; a shows; run 1; a shows looks for the index of joint 1
     home progress looks for the index of joint 2; a shows looks for the index of joint 2
     home ends; run 1; a shows; runs)");
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair();
   ask_home(frontend, manual);
   const UntypedFrontend observer("pair", {.access = Access::read_only});
   ASSERT_EQ(observer.running_requests().size(), 1U);
@@ -146,8 +142,7 @@ TEST_F(RunningRequestTest, ItsSilentSenderIsHaltedByTheWatchdogUnlessItMovesNoth
 
 TEST_F(RunningRequestTest, ABackendThatIsReplacedWhileItRunsLeavesAHalt) {
   StandingProcess child([](const StandingProcess::Stand& stand) {
-    StartedBackend manual;
-    UntypedFrontend frontend("pair");
+    auto [manual, frontend] = StartedPair();
     ask_home(frontend, manual);
     stand();
   });
@@ -156,12 +151,10 @@ TEST_F(RunningRequestTest, ABackendThatIsReplacedWhileItRunsLeavesAHalt) {
 }
 
 TEST_F(RunningRequestTest, ABurstUntilTheEndLastsUntilItsEndOrItsFreshStart) {
-  const BackendOptions bursting{.segment = "pair", .bursting = true};
-  play(bursting, "home; a = to end; in 7 home ends; drive; last 7; row 7 free; a ended 7");
-  play(bursting, "home; a = to end; in 7 home ends afresh; drive; last 8; row 8 fresh; a ended 8");
+  play_bursts("home; a = to end; in 7 home ends; drive; last 7; row 7 free; a ended 7");
+  play_bursts("home; a = to end; in 7 home ends afresh; drive; last 8; row 8 fresh; a ended 8");
   // and the fresh start needs no other burst
-  play(bursting,
-       R"(home; a = burst 3; in 3 home ends afresh; drive; a done 3; a completed; last 4)");
+  play_bursts(R"(home; a = burst 3; in 3 home ends afresh; drive; a done 3; a completed; last 4)");
 }
 
 TEST_F(RunningRequestTest, ThousandsOfThemLeaveNoBlockBehind) {

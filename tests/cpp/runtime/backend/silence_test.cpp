@@ -1,21 +1,15 @@
 // The watchdog: a commander that shows no life while something of it acts, counted in iterations.
 
-#include <gmock/gmock.h>
-
-#include "o80/base/error.hpp"
 #include "runtime/hostile_frontend.hpp"
-#include "runtime/manual_backend.hpp"
 #include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 using SilenceTest = ManualBackendTest;
 
-BackendOptions watched(Stale stale, std::int64_t silence = 5) {
-  return {.segment = "pair", .stale = stale, .silence = silence};
+BackendOptions watched(Stale stale, std::int64_t silence = 5, bool bursting = false) {
+  return {.segment = "pair", .bursting = bursting, .stale = stale, .silence = silence};
 }
 
 // rule W1
@@ -28,8 +22,7 @@ TEST_F(SilenceTest, PurgesTheCommandsOfASilentCommander) {
 TEST_F(SilenceTest, AStarvedPlanActsAndAClosedOneDoesNot) {
   enum class Closed { no, by_its_last_chunk, by_order };
   for (const Closed closed : {Closed::no, Closed::by_its_last_chunk, Closed::by_order}) {
-    StartedBackend manual(watched(Stale::halt));
-    UntypedFrontend frontend("pair");
+    auto [manual, frontend] = StartedPair(watched(Stale::halt));
     const std::array<std::uint32_t, 1> actuator{0};
     const std::array<std::uint32_t, 2> due{1, 2};
     const std::array<double, 2> rows{};
@@ -147,30 +140,21 @@ TEST_F(SilenceTest, NothingThatActsNoSilence) {
 
 // rule W3
 TEST_F(SilenceTest, ABurstIsItsSendersLifeAndStandingStillCountsNone) {
-  BackendOptions options = watched(Stale::purge);
-  options.bursting = true;
-  play(options, "a = 0 to 100 over 100; burst 50; a active; burst 10; a active");
+  play(watched(Stale::purge, 5, true),
+       "a = 0 to 100 over 100; burst 50; a active; burst 10; a active");
 }
 
 TEST_F(SilenceTest, AnothersBurstIsNot) {
-  BackendOptions options = watched(Stale::purge);
-  options.bursting = true;
-  play(options, "a = 0 to 100 over 100; B: burst 20; a purged");
+  play(watched(Stale::purge, 5, true), "a = 0 to 100 over 100; B: burst 20; a purged");
 }
 
 TEST_F(SilenceTest, LifeFromTheFutureIsThatOfNow) {
   StartedBackend manual(watched(Stale::purge));
   HostileFrontend hostile;
-  BatchBuilder builder;
   RecordHead head;
   head.pace = Pace::iterations;
   head.amount = 1000;
-  const double target = 1000.0;
-  builder.command(head, std::as_bytes(std::span(&target, 1)));
-  BatchRecord batch;
-  batch.id = hostile.sender().next_id();
-  hostile.sender().draw_ids(batch.id + 3);
-  hostile.send(builder, batch);
+  hostile.command(1000.0, {.id = hostile.draw_id()}, head);
   hostile.page().life = std::numeric_limits<std::int64_t>::max();
   manual.run(10);
   EXPECT_TRUE(UntypedFrontend("pair").latest().active(0)) << "it may say what it likes";
@@ -193,8 +177,7 @@ TEST_F(SilenceTest, ADirectValueThatStillActsCountsAlthoughNothingIsQueued) {
 
 // rule W6
 TEST_F(SilenceTest, WithoutAWatchdogADirectValueThatDoesNotRestIsRefused) {
-  StartedBackend manual({.segment = "pair"}, rest_at_zero);
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair"}, rest_at_zero);
   EXPECT_THAT(message_of<InvalidArgument>([&] { add(frontend, 0, 3.0); }),
               AllOf(HasSubstr("actuator 'shoulder'"), HasSubstr("--silence")));
   add(frontend, 0, 0.0);
@@ -204,8 +187,7 @@ TEST_F(SilenceTest, WithoutAWatchdogADirectValueThatDoesNotRestIsRefused) {
 }
 
 TEST_F(SilenceTest, ASimulationNeedsNoWatchdog) {
-  StartedBackend manual({.segment = "pair", .bursting = true}, rest_at_zero);
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair", .bursting = true}, rest_at_zero);
   add(frontend, 0, 3.0);
   EXPECT_EQ(frontend.added(), 1U);
 }

@@ -1,8 +1,6 @@
 // Frontends and backends of one process in threads, all at once: work for the thread sanitizer.
 // Bounded by what is done, not by time.
 
-#include <gmock/gmock.h>
-
 #include <atomic>
 #include <thread>
 

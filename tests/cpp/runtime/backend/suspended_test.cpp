@@ -1,7 +1,6 @@
 // Who is suspended is not dead: waits end by their timeouts, nothing of his is taken, and he goes
 // on where he was.
 
-#include <gmock/gmock.h>
 #include <signal.h>
 
 #include "memory/child_process.hpp"
@@ -13,7 +12,6 @@
 namespace o80::test {
 namespace {
 
-using ::testing::HasSubstr;
 class SuspendedTest : public ManualBackendTest {};
 
 constexpr Timeout kShort = std::chrono::milliseconds(60);  // more than a slice of a wait
@@ -36,8 +34,7 @@ void be_a_backend(bool bursting, const ChildProcess::Ready& ready) {
 }
 
 TEST_F(SuspendedTest, ABackendEndsWaitsByTheirTimeoutsAndIsNeverCalledDead) {
-  ChildProcess backend([](const auto& ready) { be_a_backend(false, ready); });
-  ASSERT_TRUE(backend.wait_until_ready());
+  ReadyProcess backend([](const auto& ready) { be_a_backend(false, ready); });
   UntypedFrontend frontend("pair");
   UntypedFrontend reader("pair", {.access = Access::read_only});
   const Batch batch = send(frontend, 0, 1.0, {.pace = iterations(1'000'000)});
@@ -67,8 +64,7 @@ TEST_F(SuspendedTest, ABackendEndsWaitsByTheirTimeoutsAndIsNeverCalledDead) {
 }
 
 TEST_F(SuspendedTest, ABackendThatBurstsEndsABurstByItsTimeoutAndRunsItLater) {
-  ChildProcess backend([](const auto& ready) { be_a_backend(true, ready); });
-  ASSERT_TRUE(backend.wait_until_ready());
+  ReadyProcess backend([](const auto& ready) { be_a_backend(true, ready); });
   UntypedFrontend frontend("pair");
   ASSERT_EQ(frontend.burst(2, kPatience).iteration(), 2);
   backend.stop_and_wait_until_stopped();
@@ -80,8 +76,7 @@ TEST_F(SuspendedTest, ABackendThatBurstsEndsABurstByItsTimeoutAndRunsItLater) {
 }
 
 TEST_F(SuspendedTest, ABackendKeepsItsName) {
-  ChildProcess backend([](const auto& ready) { be_a_backend(false, ready); });
-  ASSERT_TRUE(backend.wait_until_ready());
+  ReadyProcess backend([](const auto& ready) { be_a_backend(false, ready); });
   backend.stop_and_wait_until_stopped();
   EXPECT_THAT(message_of<SegmentTaken>([] { ManualBackend(); }),
               HasSubstr("pid " + std::to_string(backend.pid())));
@@ -93,29 +88,19 @@ TEST_F(SuspendedTest, ABackendKeepsItsName) {
   frontend.wait_for(frontend.published() + 3, kPatience);
 }
 
-/// A frontend in a process of its own: takes control and sends a movement of many iterations.
-class SuspendedCommander {
- public:
-  explicit SuspendedCommander(bool with_control)
-      : child_([=](const ChildProcess::Ready& ready) {
-          UntypedFrontend frontend("pair", {.timeout = kPatience});
-          if (with_control) frontend.add_take_control();
-          add(frontend, 0, 100.0, {.pace = iterations(100)});
-          const Batch batch = frontend.pulse();
-          ready();
-          batch.wait(kPatience);
-          if (batch.handle(with_control ? 1 : 0).status != Status::completed) _exit(4);
-          if (with_control) {
-            frontend.add_release_control();
-            frontend.pulse_and_wait(kPatience);
-          }
-        }) {}
-
-  ChildProcess& child() { return child_; }
-
- private:
-  ChildProcess child_;
-};
+/// Takes control or not, and sends a movement of many iterations.
+void be_a_commander(bool with_control, const ChildProcess::Ready& ready) {
+  UntypedFrontend frontend("pair", {.timeout = kPatience});
+  if (with_control) frontend.add_take_control();
+  add(frontend, 0, 100.0, {.pace = iterations(100)});
+  const Batch batch = frontend.pulse();
+  ready();
+  batch.wait(kPatience);
+  if (batch.handle(with_control ? 1 : 0).status != Status::completed) _exit(4);
+  if (!with_control) return;
+  frontend.add_release_control();
+  frontend.pulse_and_wait(kPatience);
+}
 
 /// Until the helper thread of this process must have asked who lives, twice over.
 void let_the_helper_ask() {
@@ -131,57 +116,54 @@ TEST_F(SuspendedTest, AFrontendKeepsItsLaneAndItsCommandsLiveOnWhateverThePolicy
   for (const Stale stale : {Stale::hold, Stale::purge, Stale::stop}) {
     // the movement of the child begins with the first iteration after its pulse
     StartedBackend manual({.segment = "pair", .lanes = 1, .stale = stale});
-    SuspendedCommander commander(false);
-    ASSERT_TRUE(commander.child().wait_until_ready());
+    ReadyProcess commander([](const auto& ready) { be_a_commander(false, ready); });
     manual.run(10);
-    commander.child().stop_and_wait_until_stopped();
+    commander.stop_and_wait_until_stopped();
     let_the_helper_ask();
 
     UntypedFrontend other("pair");
     EXPECT_DOUBLE_EQ(desired(other.latest()), 10.0);
     add(other, 1, 1.0);
     EXPECT_THAT(message_of<NoLane>([&] { other.pulse(); }),
-                HasSubstr("pid " + std::to_string(commander.child().pid())));
+                HasSubstr("pid " + std::to_string(commander.pid())));
     manual.run(90);
     EXPECT_EQ(desired(other.latest()), 100.0);
     EXPECT_EQ(manual.backend.failure(), "");
 
     // and it learns of it when it goes on
-    go_on(commander.child());
-    EXPECT_EQ(commander.child().wait(), 0);
+    go_on(commander);
+    EXPECT_EQ(commander.wait(), 0);
   }
 }
 
 TEST_F(SuspendedTest, AHolderOfControlKeepsItUntilItLetsGo) {
   StartedBackend manual;
-  SuspendedCommander commander(true);
-  ASSERT_TRUE(commander.child().wait_until_ready());
+  ReadyProcess commander([](const auto& ready) { be_a_commander(true, ready); });
   manual.run(10);
-  commander.child().stop_and_wait_until_stopped();
+  commander.stop_and_wait_until_stopped();
   let_the_helper_ask();
 
   UntypedFrontend other("pair");
   const Batch refused = send(other, 1, 1.0);
   manual.run(90);
-  EXPECT_THAT(refused.rejection(), HasSubstr("pid " + std::to_string(commander.child().pid())));
-  go_on(commander.child());
+  EXPECT_THAT(refused.rejection(), HasSubstr("pid " + std::to_string(commander.pid())));
+  go_on(commander);
   manual.run_until([&] {
     const Batch batch = send(other, 1, 2.0);
     manual.run(1);
     return batch.rejection().empty();
   });
-  EXPECT_EQ(commander.child().wait(), 0);
+  EXPECT_EQ(commander.wait(), 0);
 }
 
 TEST_F(SuspendedTest, AFrontendInABurstDelaysNobodyOnceItsBurstIsDone) {
   BurstingBackend bursting;
-  ChildProcess frontend([](const ChildProcess::Ready& ready) {
+  ReadyProcess frontend([](const ChildProcess::Ready& ready) {
     UntypedFrontend own("pair", {.timeout = kPatience});
     const Burst burst = own.start_burst(1000);
     ready();
     burst.wait(kPatience);
   });
-  ASSERT_TRUE(frontend.wait_until_ready());
   frontend.stop_and_wait_until_stopped();
   UntypedFrontend other("pair");
   EXPECT_EQ(other.burst(1, kPatience).iteration(), 1001);

@@ -1,8 +1,6 @@
 // A new backend of a name whose owner was killed, stopped or failed: at once, and everybody who is
 // attached learns what became of the old one.
 
-#include <gmock/gmock.h>
-#include <signal.h>
 #include <time.h>
 
 #include <algorithm>
@@ -14,8 +12,6 @@
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 class TakeOverTest : public ManualBackendTest {};
 
 void run_until_killed(const StandingProcess::Stand& stand) {

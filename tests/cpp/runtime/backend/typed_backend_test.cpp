@@ -8,8 +8,6 @@
 namespace o80::test {
 namespace {
 
-using ::testing::HasSubstr;
-
 class TypedBackendTest : public ManualBackendTest {};
 
 TEST_F(TypedBackendTest, ServesRequestsAndReadsAfresh) {

@@ -5,8 +5,6 @@
 namespace o80::test {
 namespace {
 
-using ::testing::HasSubstr;
-
 class BatchTest : public ManualBackendTest {};
 
 TEST_F(BatchTest, FollowsEachCommandFromQueuedToItsEnd) {
@@ -16,8 +14,7 @@ TEST_F(BatchTest, FollowsEachCommandFromQueuedToItsEnd) {
     run 1; a completed @2; run 1; a.1 active @3; a open; a ended -1
     run 2; a.3 rejected late; a.3 says came after; a ended 5; a waits 1 of 4)",
        [](Schema& schema) { schema.actuator(1).limits({.speed = 1000}); });
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair();
   const Batch batch = send(frontend, 0, 1.0, {.pace = until(0)});
   manual.run(1);
   EXPECT_EQ(batch.handles().size(), 1U);
@@ -28,8 +25,7 @@ TEST_F(BatchTest, FollowsEachCommandFromQueuedToItsEnd) {
 
 // rule B11
 TEST_F(BatchTest, TellsHowLateItsDecisionWas) {
-  StartedBackend manual({.segment = "pair", .history = 8, .lane_blocks = 16});
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair", .history = 8, .lane_blocks = 16});
   manual.run(2);
   const UntypedObservation seen = frontend.latest();
   manual.run(3);
@@ -91,8 +87,7 @@ TEST_F(BatchTest, NeverForgetsWhatStillRunsHoweverMuchIsSentMeanwhile) {
 }
 
 TEST_F(BatchTest, WaitsUntilTheLastOfItsCommandsHasEndedAndItsRowIsThere) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair();
   add(frontend, 0, 1.0, {.pace = iterations(300)});
   add(frontend, 1, 1.0, {.pace = iterations(500)});
   const Batch batch = frontend.pulse();
@@ -105,8 +100,7 @@ TEST_F(BatchTest, WaitsUntilTheLastOfItsCommandsHasEndedAndItsRowIsThere) {
 }
 
 TEST_F(BatchTest, AWaitThatTakesTooLongSaysWhatToDo) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair();
   const Batch batch = send(frontend, 0, 1.0);
   EXPECT_THAT(message_of<TimeoutError>([&] { batch.wait(kAtOnce); }), HasSubstr("purge"));
 }

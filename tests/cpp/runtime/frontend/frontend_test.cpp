@@ -2,26 +2,20 @@
 
 #include <atomic>
 #include <optional>
-#include <utility>
 
 #include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-
 class FrontendTest : public ManualBackendTest {};
 
 // ------------------------------------------------------------------------------ adding
 
 TEST_F(FrontendTest, RefusesWhatTheRobotCannotFollowWhenItIsAdded) {
-  StartedBackend manual({.segment = "pair"}, [](Schema& schema) {
+  auto [manual, frontend] = StartedPair({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(1).limits({.minimum = -1, .maximum = 1, .speed = 10});
   });
-  UntypedFrontend frontend("pair");
   const auto refusal = [&](auto&& call) { return message_of<InvalidArgument>(call); };
   EXPECT_THAT(refusal([&] { add(frontend, 1, 1.5); }), HasSubstr("elbow"));
   EXPECT_NE(refusal([&] { add(frontend, 1, 0.5, {.pace = speed(11)}); }), "");
@@ -40,9 +34,8 @@ TEST_F(FrontendTest, RefusesWhatTheRobotCannotFollowWhenItIsAdded) {
 }
 
 TEST_F(FrontendTest, TheLastStateOfATrajectoryIsNoDirectValue) {
-  StartedBackend manual({.segment = "pair"},
-                        [](Schema& schema) { schema.actuator(0).rests_at("", 0); });
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] =
+      StartedPair({.segment = "pair"}, [](Schema& schema) { schema.actuator(0).rests_at("", 0); });
   const std::array<double, 2> rows{1, 2};
   frontend.add_trajectory(0, 2, std::as_bytes(std::span(rows)), {.mode = Mode::overwrite});
   frontend.pulse();
@@ -51,8 +44,7 @@ TEST_F(FrontendTest, TheLastStateOfATrajectoryIsNoDirectValue) {
 }
 
 TEST_F(FrontendTest, RefusesOptionsThatContradictEachOther) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair();
   const auto refusal = [&](const CommandOptions& options) {
     return message_of<InvalidArgument>([&] { add(frontend, 0, 1.0, options); });
   };
@@ -66,8 +58,7 @@ TEST_F(FrontendTest, RefusesOptionsThatContradictEachOther) {
 }
 
 TEST_F(FrontendTest, RefusesATrajectoryWhoseTimesMakeNoSense) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair();
   const std::array<double, 3> rows{1, 2, 4};
   constexpr std::int64_t kMs = 1'000'000;  // the period
   const auto add_with = [&](std::vector<std::int64_t> times, CommandOptions options = {}) {
@@ -89,22 +80,9 @@ TEST_F(FrontendTest, RefusesATrajectoryWhoseTimesMakeNoSense) {
 
 // ------------------------------------------------------------------------------ sending
 
-TEST_F(FrontendTest, AnEmptyBatchReturnsAtOnce) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
-  const Batch batch = frontend.pulse();
-  EXPECT_TRUE(batch.empty());
-  EXPECT_TRUE(batch.ended());
-  batch.wait(std::nullopt);
-  EXPECT_EQ(batch.first_iteration(), -1);
-  EXPECT_EQ(batch.rejection(), "");
-  EXPECT_EQ(frontend.pulse_and_wait(std::nullopt).iteration(), 0);
-}
-
 // rule B6
 TEST_F(FrontendTest, AFullLaneIsAnErrorAndNothingIsSentAndNothingIsLost) {
-  StartedBackend manual({.segment = "pair", .lane_blocks = 64});
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair", .lane_blocks = 64});
   for (int i = 0; i < 40; ++i) add(frontend, 0, i, {.pace = iterations(2)});
   const Batch first = frontend.pulse();
   for (int i = 0; i < 40; ++i) add(frontend, 1, i);
@@ -127,8 +105,7 @@ TEST_F(FrontendTest, AFullLaneIsAnErrorAndNothingIsSentAndNothingIsLost) {
 
 // rule B6
 TEST_F(FrontendTest, ALaneFullOfCommandsStillTakesAPurge) {
-  StartedBackend manual({.segment = "pair", .lane_blocks = 16});
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair", .lane_blocks = 16});
   Batch endless;
   const auto fill = [&] {
     while (true) {
@@ -148,8 +125,7 @@ TEST_F(FrontendTest, ALaneFullOfCommandsStillTakesAPurge) {
 }
 
 TEST_F(FrontendTest, ALaneFullOfWhatIsScheduledStillTakesABurst) {
-  StartedBackend manual({.segment = "pair", .bursting = true, .lane_blocks = 16});
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair", .bursting = true, .lane_blocks = 16});
   const auto fill = [&] {
     while (true) {
       add(frontend, 0, 3.0);
@@ -164,8 +140,7 @@ TEST_F(FrontendTest, ALaneFullOfWhatIsScheduledStillTakesABurst) {
 }
 
 TEST_F(FrontendTest, ABatchLargerThanItsLaneSaysHowToSendIt) {
-  StartedBackend manual({.segment = "pair", .lane_blocks = 64});
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair", .lane_blocks = 64});
   for (int i = 0; i < 64; ++i) add(frontend, 0, i);
   EXPECT_THAT(message_of<LaneFull>([&] { frontend.pulse(); }),
               AllOf(HasSubstr("has 60"), HasSubstr("in parts")));
@@ -175,21 +150,8 @@ TEST_F(FrontendTest, ABatchLargerThanItsLaneSaysHowToSendIt) {
   EXPECT_EQ(desired(frontend.latest()), 1.0);
 }
 
-TEST_F(FrontendTest, APureReaderTakesNoLaneAndMayBeReadOnly) {
-  StartedBackend manual({.segment = "pair", .lanes = 1});
-  UntypedFrontend reader("pair", {.access = Access::read_only});
-  UntypedFrontend another("pair");
-  UntypedFrontend commander("pair");
-  send(commander, 0, 1.0);
-  manual.run(1);
-  EXPECT_EQ(desired(reader.latest()), 1.0);
-  EXPECT_EQ(reader.wait_for(1, kPatience).iteration(), 1);
-  EXPECT_THROW(send(reader, 0, 1.0), ReadOnly);
-}
-
 TEST_F(FrontendTest, ClosedItRefusesAllAndGivesItsLaneBack) {
-  StartedBackend manual({.segment = "pair", .lanes = 1});
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair", .lanes = 1});
   const Batch batch = send(frontend, 0, 1.0, {.pace = iterations(2)});
   frontend.close();
   EXPECT_TRUE(frontend.closed());
@@ -208,8 +170,7 @@ TEST_F(FrontendTest, ClosedItRefusesAllAndGivesItsLaneBack) {
 
 // rule O5
 TEST_F(FrontendTest, ReadsRowsByTheirIteration) {
-  StartedBackend manual({.segment = "pair", .history = 10});
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair({.segment = "pair", .history = 10});
   manual.run(25);
   EXPECT_EQ(frontend.published(), 25);
   EXPECT_EQ(frontend.oldest(), 16);
@@ -290,15 +251,6 @@ TEST_F(FrontendTest, WaitsEndWithAnErrorThatSaysWhatBecameOfTheBackend) {
   EXPECT_THROW(UntypedFrontend("pair", {.timeout = kPatience}), BackendFailed);
   const UntypedFrontend late("pair", {.timeout = kPatience, .dead = true});
   EXPECT_EQ(late.latest().iteration(), 1);
-}
-
-TEST_F(FrontendTest, AWaitEndsWhenItsCallerSaysSo) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
-  int requested = 0;
-  EXPECT_THROW(frontend.wait_for(99, kPatience, [&] { return ++requested < 2; }), Cancelled);
-  const Batch batch = send(frontend, 0, 1.0);
-  EXPECT_THROW(batch.wait(kPatience, [] { return false; }), Cancelled);
 }
 
 }  // namespace

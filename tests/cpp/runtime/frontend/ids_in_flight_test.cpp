@@ -30,16 +30,6 @@ TEST(IdsInFlight, FollowEachOtherOverThePlacesOfWhatHasEnded) {
   }
 }
 
-TEST(IdsInFlight, AreNoneWhenWhatRunsLeavesNoRow) {
-  IdsInFlight ids(kPlaces);
-  ids.sent(1, 10);
-  ids.sent(11, 10);
-  EXPECT_EQ(ids.draw(21, 13, kNone), std::nullopt);
-  const std::optional<CommandId> first = ids.draw(21, 12, kNone);
-  ASSERT_TRUE(first);
-  EXPECT_EQ(*first % kPlaces, 21U);
-}
-
 TEST(IdsInFlight, StayWhereTheyWereWhenThereAreNone) {
   IdsInFlight ids(kPlaces);
   ids.sent(1, 10);

@@ -1,6 +1,5 @@
 #include "runtime/frontend/loop_state.hpp"
 
-#include <gmock/gmock.h>
 #include <unistd.h>
 
 #include <thread>
@@ -11,7 +10,6 @@ namespace o80::test {
 namespace {
 
 using ::testing::Eq;
-using ::testing::HasSubstr;
 using ::testing::Optional;
 using LoopStateTest = ManualBackendTest;
 

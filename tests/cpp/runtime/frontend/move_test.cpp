@@ -9,9 +9,6 @@
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-
 constexpr std::array<std::uint32_t, 1> kShoulder{0};
 constexpr std::array<std::uint32_t, 2> kBoth{0, 1};
 
@@ -57,38 +54,6 @@ TEST_F(MoveTest, LeavesWhatWasAddedAndNotPulsed) {
   EXPECT_EQ(desired(row, 1), 0.0);
 }
 
-// rule S5
-TEST_F(MoveTest, SaysWhereTheRobotIsIfItIsNotThereInTime) {
-  ManualBackend manual({.segment = "pair", .period = 1'000'000, .bursting = true});
-  manual.before_publish = [&] { manual.now[1] = 0.25; };  // it is stuck
-  manual.start();
-  std::thread runner([&] { manual.serve_bursts(); });
-  UntypedFrontend frontend("pair");
-  try {
-    frontend.move_to(kBoth, bytes(std::array{1.0, 2.0}), {.tolerance = 0.5},
-                     std::chrono::milliseconds(20));
-    ADD_FAILURE() << "it is stuck";
-  } catch (const NotReached& error) {
-    EXPECT_THAT(error.what(),
-                AllOf(HasSubstr("'pair' was not at its targets within 0.02 s"),
-                      HasSubstr("'elbow' is observed at 0.25, 1.75 from its target of 2 "
-                                "(tolerance 0.5)"),
-                      HasSubstr("has completed")));
-    ASSERT_EQ(error.misses().size(), 1U);
-    EXPECT_EQ(error.misses()[0].actuator, "elbow");
-    EXPECT_EQ(error.misses()[0].target, 2.0);
-    EXPECT_EQ(error.misses()[0].observed, 0.25);
-    EXPECT_EQ(error.misses()[0].distance, 1.75);
-    EXPECT_EQ(error.misses()[0].tolerance, 0.5);
-    EXPECT_EQ(error.observation().iteration(), 20) << "of the time of the robot";
-    EXPECT_TRUE(error.batch().ended());
-  }
-  frontend.move_to(kBoth, bytes(std::array{1.0, 2.0}),
-                   {.tolerances = {0.5, std::numeric_limits<double>::infinity()}}, kPatience);
-  manual.backend.ask_to_stop();
-  runner.join();
-}
-
 TEST_F(MoveTest, ThrowsIfItsCommandDoesNotComplete) {
   BurstingBackend bursting("pair", [](ManualBackend& manual) {
     manual.before_publish = [&manual] {
@@ -104,8 +69,7 @@ TEST_F(MoveTest, ThrowsIfItsCommandDoesNotComplete) {
 }
 
 TEST_F(MoveTest, InRealTimeItWaitsForTheRowsAsTheyCome) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair();
   manual.before_publish = [&] {
     if (manual.backend.iteration() < 50) manual.now[0] = 0;  // it begins to move late
   };
@@ -119,8 +83,7 @@ TEST_F(MoveTest, InRealTimeItWaitsForTheRowsAsTheyCome) {
 }
 
 TEST_F(MoveTest, AHaltWhileItSettlesEndsIt) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair();
   manual.before_publish = [&] { manual.now[0] = 0; };  // it is stuck
   const Move move = frontend.start_move(kShoulder, bytes(std::array{1.0}), {.tolerance = 0.1});
   manual.run(3);
@@ -132,8 +95,7 @@ TEST_F(MoveTest, AHaltWhileItSettlesEndsIt) {
 }
 
 TEST_F(MoveTest, RefusesTolerancesThatDoNotFit) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair();
   const auto told = [&](const MoveOptions& options) {
     return message_of<InvalidArgument>(
         [&] { frontend.start_move(kBoth, bytes(std::array{1.0, 2.0}), options); });

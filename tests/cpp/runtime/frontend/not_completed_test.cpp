@@ -1,14 +1,9 @@
 #include "o80/runtime/not_completed.hpp"
 
-#include "runtime/manual_backend.hpp"
 #include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 using NotCompletedTraces = ManualBackendTest;
 

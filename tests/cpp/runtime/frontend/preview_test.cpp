@@ -1,7 +1,5 @@
 // A preview is what the backend then does, bit for bit.
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -22,8 +20,6 @@ namespace {
 using described::Gripper;
 using described::Joint;
 using described::MixedRobot;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 
 Limits random_limits(Dice& dice, std::int64_t most = 4) {
   Limits limits;
@@ -232,11 +228,10 @@ TEST_F(PreviewTest, IsWhatTheBackendThenDoesBitForBit) {
 
 // rule C4
 TEST_F(PreviewTest, IsExactForACommandThatOverwritesAPlannedMotion) {
-  StartedBackend manual({.segment = "pair"}, [](Schema& schema) {
+  auto [manual, frontend] = StartedPair({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(0).limits({.speed = 2.0, .acceleration = 15.0, .jerk = 500.0});
     schema.actuator(1).limits({.speed = 3.0, .acceleration = 30.0});
   });
-  UntypedFrontend frontend("pair");
   Dice dice(7);
   const std::array<std::uint32_t, 2> both{0, 1};
   for (int i = 0; i < 50; ++i) {
@@ -257,10 +252,9 @@ TEST_F(PreviewTest, IsExactForACommandThatOverwritesAPlannedMotion) {
 }
 
 TEST_F(PreviewTest, BeginsAtRestAfterAFreshStart) {
-  StartedBackend manual({.segment = "pair"}, [](Schema& schema) {
+  auto [manual, frontend] = StartedPair({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(0).limits({.speed = 2.0, .acceleration = 15.0, .jerk = 500.0});
   });
-  UntypedFrontend frontend("pair");
   send(frontend, 0, 1.0, {.pace = iterations(500)});
   manual.run(200);
   add_request(frontend, Reset{.seed = 3});
@@ -271,52 +265,6 @@ TEST_F(PreviewTest, BeginsAtRestAfterAFreshStart) {
   const Preview from_rest = preview_from(frontend, frontend.latest(), 3.1, options);
   ASSERT_EQ(preview.iterations(), from_rest.iterations());
   EXPECT_TRUE(preview.rows.bytes == from_rest.rows.bytes);
-}
-
-TEST_F(PreviewTest, SaysByHowMuchLaterAndWhy) {
-  StartedBackend manual({.segment = "pair"}, [](Schema& schema) {
-    schema.actuator(1).limits({.speed = 2.0, .acceleration = 15.0, .jerk = 500.0});
-  });
-  const UntypedFrontend frontend("pair", {.access = Access::read_only});
-  const double target = 0.1;
-  const Preview preview = preview_of(frontend, 1, target, {.pace = iterations(100)});
-  EXPECT_EQ(preview.late, preview.iterations() - 100);
-  EXPECT_EQ(preview.text, std::to_string(preview.late) +
-                              " iterations later than requested, because of its jerk limit");
-  EXPECT_EQ(unpack<double>(preview.rows.row(preview.rows.count - 1).data() + 8), target);
-  EXPECT_EQ(frontend.published(), 0) << "nothing was sent";
-}
-
-TEST_F(PreviewTest, BeginsAfterTheRowThatIsGiven) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
-  UntypedObservation row = frontend.latest();
-  pack(1.0, row.bytes() + row.layout().desired);
-  const Preview preview = preview_from(frontend, row, 2.0, {.pace = iterations(2)});
-  EXPECT_EQ(unpack<double>(preview.rows.row(0).data()), 1.5);
-
-  pack(std::nan(""), row.bytes() + row.layout().desired);
-  EXPECT_THAT(message_of<InvalidArgument>([&] { preview_from(frontend, row, 2.0); }),
-              AllOf(HasSubstr("'shoulder'"), HasSubstr("not finite")));
-}
-
-TEST_F(PreviewTest, RefusesWhatAddRefusesAndWhatItCannotCompute) {
-  StartedBackend manual({.segment = "pair"}, [](Schema& schema) {
-    schema.actuator(1).limits({.maximum = 1, .speed = 1});
-  });
-  manual.run(3);
-  UntypedFrontend frontend("pair");
-  const auto refusal = [&](double target, const PaceSpec& pace) {
-    return message_of<InvalidArgument>([&] { preview_of(frontend, 1, target, {.pace = pace}); });
-  };
-  EXPECT_THAT(refusal(1.5, direct()), HasSubstr("outside its limits"));
-  EXPECT_THAT(refusal(0.5, fastest()), HasSubstr("fastest"));
-  EXPECT_THAT(refusal(0.5, until(3)), HasSubstr("would begin in iteration 4"));
-  EXPECT_THAT(refusal(0.5, iterations(5'000'000)), HasSubstr("more than 1000000 iterations"));
-  EXPECT_THAT(refusal(0.5, speed(1e-9)), HasSubstr("more than 1000000 iterations"));
-  EXPECT_EQ(refusal(0.5, until(4)), "");
-  frontend.close();
-  EXPECT_THROW(preview_of(frontend, 1, 0.0), Closed);
 }
 
 /// An angle that takes the short way round.

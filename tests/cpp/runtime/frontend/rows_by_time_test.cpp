@@ -1,4 +1,3 @@
-#include <gmock/gmock.h>
 
 #include <random>
 
@@ -6,8 +5,6 @@
 
 namespace o80::test {
 namespace {
-
-using ::testing::HasSubstr;
 
 class RowsByTimeTest : public ManualBackendTest {};
 
@@ -18,8 +15,7 @@ BackendOptions millisecond(std::uint64_t history) {
 
 // rule O7
 TEST_F(RowsByTimeTest, AgreesWithASearchThroughAllRowsThatAreThere) {
-  StartedBackend manual(millisecond(32));
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair(millisecond(32));
   std::mt19937_64 random(7);
   for (int round = 0; round < 50; ++round) {
     frontend.start_burst(std::uniform_int_distribution<std::int64_t>(1, 9)(random));
@@ -57,8 +53,7 @@ TEST_F(RowsByTimeTest, AgreesWithASearchThroughAllRowsThatAreThere) {
 }
 
 TEST_F(RowsByTimeTest, SaysThatARowIsNoLongerThere) {
-  StartedBackend manual(millisecond(8));
-  UntypedFrontend frontend("pair");
+  auto [manual, frontend] = StartedPair(millisecond(8));
   frontend.start_burst(100);
   manual.drive();
   EXPECT_THAT(message_of<RowOverwritten>([&] { frontend.at_time(5'000'000); }),

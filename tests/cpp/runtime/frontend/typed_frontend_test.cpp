@@ -12,10 +12,19 @@ using described::Gripper;
 using described::Joint;
 using described::LaunchBall;
 using described::MixedRobot;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 
 class TypedTest : public ManualBackendTest {};
+
+class MixedRobotTest : public ManualBackendTest {
+ protected:
+  MixedRobotTest() {
+    backend.publish({});
+    frontend.emplace("mixed");
+  }
+
+  Backend<MixedRobot> backend{{.segment = "mixed"}};
+  std::optional<Frontend<MixedRobot>> frontend;
+};
 
 /// Another idea of the mixed robot.
 struct OtherJoint {
@@ -35,14 +44,11 @@ struct Thermometer {
 };
 O80_DESCRIBE(Thermometer::Reading, (celsius, "[°C]"));
 
-TEST_F(TypedTest, CommandsARobotOfMixedStatesByNameAndByIndex) {
-  Backend<MixedRobot> backend({.segment = "mixed"});
-  backend.publish({});
-  Frontend<MixedRobot> frontend("mixed");
-  frontend.add_command("joints_3", Joint{.position = 1, .velocity = 2});
-  frontend.add_command("gripper", Gripper{.width = 0.5F, .closed = true});
-  frontend.add_command(8, ControlMode::torque);
-  frontend.pulse();
+TEST_F(MixedRobotTest, CommandsARobotOfMixedStatesByNameAndByIndex) {
+  frontend->add_command("joints_3", Joint{.position = 1, .velocity = 2});
+  frontend->add_command("gripper", Gripper{.width = 0.5F, .closed = true});
+  frontend->add_command(8, ControlMode::torque);
+  frontend->pulse();
   const auto desired = backend.step();
   ASSERT_TRUE(desired);
   EXPECT_EQ(desired->joints[3].velocity, 2);
@@ -51,27 +57,24 @@ TEST_F(TypedTest, CommandsARobotOfMixedStatesByNameAndByIndex) {
   described::Sensors sensors;
   sensors.matrix[2][1] = 4;
   backend.publish(*desired, sensors);
-  const Observation<MixedRobot> row = frontend.latest();
+  const Observation<MixedRobot> row = frontend->latest();
   EXPECT_EQ(row.observed().joints[3].position, 1);
   EXPECT_EQ(row.desired().gripper.width, 0.5F);
   EXPECT_EQ(row.extended().matrix[2][1], 4);
 }
 
-TEST_F(TypedTest, CommandsSeveralActuatorsOfOneTypeAtOnce) {
-  Backend<MixedRobot> backend({.segment = "mixed"});
-  backend.publish({});
-  Frontend<MixedRobot> frontend("mixed");
-  frontend.add_commands({"joints_3", "joints_0"}, {Joint{.position = 1}, Joint{.position = 2}},
-                        {.pace = iterations(2)});
+TEST_F(MixedRobotTest, CommandsSeveralActuatorsOfOneTypeAtOnce) {
+  frontend->add_commands({"joints_3", "joints_0"}, {Joint{.position = 1}, Joint{.position = 2}},
+                         {.pace = iterations(2)});
   EXPECT_THAT(message_of<InvalidArgument>(
-                  [&] { frontend.add_commands({"joints_3", "gripper"}, {Joint{}, Joint{}}); }),
+                  [&] { frontend->add_commands({"joints_3", "gripper"}, {Joint{}, Joint{}}); }),
               HasSubstr("'gripper'"));
   EXPECT_THAT(message_of<InvalidArgument>(
-                  [&] { frontend.add_commands({"joints_3", "joints_0"}, {Joint{}}); }),
+                  [&] { frontend->add_commands({"joints_3", "joints_0"}, {Joint{}}); }),
               HasSubstr("2 actuators"));
-  const Batch batch = frontend.pulse({.seen = frontend.latest()});
+  const Batch batch = frontend->pulse({.seen = frontend->latest()});
   EXPECT_EQ(batch.size(), 1U);
-  EXPECT_EQ(batch.seen()->epoch, frontend.epoch());
+  EXPECT_EQ(batch.seen()->epoch, frontend->epoch());
   const auto desired = backend.step();
   ASSERT_TRUE(desired);
   EXPECT_EQ(desired->joints[3].position, 0.5);
@@ -103,21 +106,16 @@ TEST_F(TypedTest, MovesToTargetsAndWaitsUntilTheyAreObserved) {
   runner.join();
 }
 
-TEST_F(TypedTest, RefusesAStateOfAnotherTypeEvenIfItHasTheSameSize) {
-  Backend<MixedRobot> backend({.segment = "mixed"});
-  backend.publish({});
-  Frontend<MixedRobot> frontend("mixed");
-  EXPECT_THAT(message_of<InvalidArgument>([&] { frontend.add_command("gripper", 1.0); }),
+TEST_F(MixedRobotTest, RefusesAStateOfAnotherTypeEvenIfItHasTheSameSize) {
+  EXPECT_THAT(message_of<InvalidArgument>([&] { frontend->add_command("gripper", 1.0); }),
               HasSubstr("'gripper'"));
-  EXPECT_THROW(frontend.add_command("mode", std::uint8_t{3}), InvalidArgument);
-  EXPECT_THROW(frontend.add_command("mode", static_cast<ControlMode>(17)), InvalidArgument);
-  EXPECT_THROW(frontend.add_command(99, 1.0), InvalidArgument);
+  EXPECT_THROW(frontend->add_command("mode", std::uint8_t{3}), InvalidArgument);
+  EXPECT_THROW(frontend->add_command("mode", static_cast<ControlMode>(17)), InvalidArgument);
+  EXPECT_THROW(frontend->add_command(99, 1.0), InvalidArgument);
 }
 
-TEST_F(TypedTest, RefusesARobotThatIsLaidOutOtherwiseShowingTheDifference) {
-  Backend<MixedRobot> backend({.segment = "mixed"});
-  backend.publish({});
-  EXPECT_THAT(message_of<SchemaMismatch>([] { Frontend<OtherRobot> frontend("mixed"); }),
+TEST_F(MixedRobotTest, RefusesARobotThatIsLaidOutOtherwiseShowingTheDifference) {
+  EXPECT_THAT(message_of<SchemaMismatch>([] { Frontend<OtherRobot> other("mixed"); }),
               AllOf(HasSubstr("'mixed'"), HasSubstr("actuators: expected 7, found 9"),
                     HasSubstr("actuator 0 field 'torque'"), HasSubstr("from the same types")));
 }
@@ -161,13 +159,10 @@ TEST_F(TypedTest, APureSensorHasNoActuators) {
               HasSubstr("no actuators"));
 }
 
-TEST_F(TypedTest, FollowsATrajectory) {
-  Backend<MixedRobot> backend({.segment = "mixed"});
-  backend.publish({});
-  Frontend<MixedRobot> frontend("mixed");
+TEST_F(MixedRobotTest, FollowsATrajectory) {
   const std::array<Joint, 3> rows{Joint{1, 0}, Joint{2, 0}, Joint{3, 0}};
-  frontend.add_trajectory("joints_0", std::span<const Joint>(rows));
-  frontend.pulse();
+  frontend->add_trajectory("joints_0", std::span<const Joint>(rows));
+  frontend->pulse();
   for (const Joint& row : rows) {
     const auto desired = backend.step();
     ASSERT_TRUE(desired);
@@ -176,14 +171,11 @@ TEST_F(TypedTest, FollowsATrajectory) {
   }
 }
 
-TEST_F(TypedTest, PlaysAChunkAndSaysWhatBecameOfIt) {
-  Backend<MixedRobot> backend({.segment = "mixed"});
-  backend.publish({});
-  Frontend<MixedRobot> frontend("mixed");
+TEST_F(MixedRobotTest, PlaysAChunkAndSaysWhatBecameOfIt) {
   const std::array<Joint, 3> rows{Joint{1, 0}, Joint{2, 0}, Joint{3, 0}};
   const std::array<std::uint32_t, 3> due{2, 5, 9};
-  frontend.add_chunk("joints_0", due, std::span<const Joint>(rows), {.anchor = 0, .ease = 1});
-  const Batch batch = frontend.pulse();
+  frontend->add_chunk("joints_0", due, std::span<const Joint>(rows), {.anchor = 0, .ease = 1});
+  const Batch batch = frontend->pulse();
   EXPECT_FALSE(batch.shift());
   EXPECT_FALSE(batch.take_over());
   for (Iteration now = 1; now <= 9; ++now) {
@@ -203,7 +195,7 @@ TEST_F(TypedTest, PlaysAChunkAndSaysWhatBecameOfIt) {
   EXPECT_EQ(batch.handle(0).status, Status::completed);
 
   const auto refuses = [&](std::vector<std::uint32_t> wrong, const ChunkOptions& options) {
-    EXPECT_THROW(frontend.add_chunk("joints_0", wrong, std::span<const Joint>(rows), options),
+    EXPECT_THROW(frontend->add_chunk("joints_0", wrong, std::span<const Joint>(rows), options),
                  InvalidArgument);
   };
   refuses({2, 5}, {});
@@ -212,7 +204,7 @@ TEST_F(TypedTest, PlaysAChunkAndSaysWhatBecameOfIt) {
   refuses({2, 5, 9}, {.ease = (std::uint32_t{1} << 31) + 1});
   refuses({2, 5, 9}, {.first = 3});
   refuses({2, 5, 9}, {.profile = Profile::minimum_jerk});
-  EXPECT_EQ(frontend.added(), 0U);
+  EXPECT_EQ(frontend->added(), 0U);
 }
 
 }  // namespace

@@ -1,4 +1,3 @@
-#include <gmock/gmock.h>
 
 #include <optional>
 
@@ -6,9 +5,6 @@
 
 namespace o80::test {
 namespace {
-
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 class WaitForFirstTest : public ManualBackendTest {
  protected:
@@ -22,17 +18,6 @@ class WaitForFirstTest : public ManualBackendTest {
   UntypedFrontend right_{"right"};
 };
 
-TEST_F(WaitForFirstTest, NamesAllRowsThatAreThere) {
-  EXPECT_THAT(wait_for_first(wish(0, 0), kAtOnce), ElementsAre(0, 1));
-  EXPECT_THAT(wait_for_first(wish(1, 0), kAtOnce), ElementsAre(1));
-}
-
-TEST_F(WaitForFirstTest, EndsWithTheFirstRow) {
-  const Burst burst = right_.start_burst(5);
-  EXPECT_THAT(wait_for_first(wish(1, 5), kPatience), ElementsAre(1));
-  burst.wait(kPatience);
-}
-
 TEST_F(WaitForFirstTest, SaysWhereEachOneStandsAfterATimeout) {
   const std::string said = message_of<TimeoutError>([&] { wait_for_first(wish(1, 2), kAtOnce); });
   EXPECT_THAT(said, HasSubstr("'left' is at row 0 of 1 (it waits for a burst)"));
@@ -44,19 +29,6 @@ TEST_F(WaitForFirstTest, NamesTheBackendThatHasStopped) {
   EXPECT_THAT(message_of<BackendStopped>([&] { wait_for_first(wish(1, 1), kPatience); }),
               HasSubstr("'right'"));
   EXPECT_THAT(wait_for_first(wish(0, 1), kPatience), ElementsAre(0));
-}
-
-TEST_F(WaitForFirstTest, IsEndedByTheCloseOfOne) {
-  std::thread closer;
-  EXPECT_THROW(wait_for_first(wish(1, 1), kPatience,
-                              [&] {
-                                if (!closer.joinable()) {
-                                  closer = std::thread([&] { left_.close(); });
-                                }
-                                return true;
-                              }),
-               Closed);
-  closer.join();
 }
 
 TEST_F(WaitForFirstTest, RefusesNothingAndRowsThatCannotBe) {

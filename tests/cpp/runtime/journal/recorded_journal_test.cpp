@@ -2,8 +2,6 @@
 
 #include "runtime/journal/recorded_journal.hpp"
 
-#include <gmock/gmock.h>
-
 #include <random>
 #include <tuple>
 
@@ -33,50 +31,39 @@ auto facts_of(const std::vector<JournalEntry>& entries) {
   return facts;
 }
 
-class RecordedJournalTest : public ManualBackendTest {
+class RecordedJournalTest : public ObservedBackendTest {
  protected:
-  explicit RecordedJournalTest(std::int64_t journal = 1 << 20)
-      : manual({.segment = "pair", .journal = journal}) {
-    manual.start();
-    commander.emplace("pair");
-    observer.emplace("pair", FrontendOptions{.access = Access::read_only});
-  }
+  RecordedJournalTest() : ObservedBackendTest({.segment = "pair", .journal = 1 << 20}) {}
   /// Batches of one to three commands, some of them for later, a request, an interrupt and a halt.
   void play(int batches) {
     std::mt19937 random(7);
     for (int i = 0; i < batches; ++i) {
       for (unsigned left = random() % 3 + 1; left > 0; --left) {
-        add(*commander, random() % 2, 0.125 * (random() % 9), {.pace = iterations(3)});
+        add(commander, random() % 2, 0.125 * (random() % 9), {.pace = iterations(3)});
       }
-      if (i == batches / 2) add_request(*commander, Reset{.seed = 5});
+      if (i == batches / 2) add_request(commander, Reset{.seed = 5});
       PulseOptions options;
       if (i % 5 == 0) options.at = manual.last() + 4;
-      commander->pulse(options);
+      commander.pulse(options);
       manual.run(2);
       if (i % 7 == 0) manual.backend.interrupt(1);
     }
-    commander->halt("enough");
+    commander.halt("enough");
     manual.run(2);
   }
-  std::shared_ptr<const Description> description() const { return observer->description(); }
-  std::vector<JournalEntry> entries_of(Journal journal) const {
-    std::vector<JournalEntry> entries;
-    for (JournalEntry entry; journal.next(entry);) entries.push_back(entry);
-    return entries;
+  std::vector<JournalEntry> all() const {
+    Journal journal(observer);
+    return all_of(journal);
   }
-
-  ManualBackend manual;
-  std::optional<UntypedFrontend> commander;
-  std::optional<UntypedFrontend> observer;
 };
 
 TEST_F(RecordedJournalTest, PartsOfAnySizeGiveTheSameEntriesAsTheRing) {
   play(40);
-  const std::vector<JournalEntry> there = entries_of(Journal(*observer));
+  const std::vector<JournalEntry> there = all();
   EXPECT_GT(there.size(), 100U);
   for (const std::size_t most : {std::size_t{1}, std::size_t{100}, std::size_t{3000}, kMuch}) {
-    RawJournal raw(*observer, 0);
-    RecordedJournal journal(description());
+    RawJournal raw(observer, 0);
+    RecordedJournal journal(observer.description());
     std::vector<JournalEntry> entries;
     std::uint64_t next = 0;
     for (RawJournal::Entries part; (part = raw.read(most)).next != part.first;) {
@@ -89,33 +76,23 @@ TEST_F(RecordedJournalTest, PartsOfAnySizeGiveTheSameEntriesAsTheRing) {
 }
 
 TEST_F(RecordedJournalTest, ASuccessorGoesOnWithinALargeBatch) {
-  for (int i = 0; i < 3000; ++i) add(*commander, 0, 0.001 * i);
-  commander->pulse();
+  for (int i = 0; i < 3000; ++i) add(commander, 0, 0.001 * i);
+  commander.pulse();
   manual.run(30);
-  RawJournal raw(*observer, 0);
+  RawJournal raw(observer, 0);
   std::vector<RawJournal::Entries> parts;
   for (RawJournal::Entries part; (part = raw.read(1)).next != part.first;) parts.push_back(part);
-  const std::vector<JournalEntry> there = entries_of(Journal(*observer));
+  const std::vector<JournalEntry> there = all();
   ASSERT_FALSE(there.empty());
   ASSERT_EQ(there.front().records.size(), 3000U);
   ASSERT_GT(parts.size(), 4U) << "its blocks are several entries";
   for (std::size_t i = 1; i < 4; ++i) {
-    RecordedJournal journal(description());
+    RecordedJournal journal(observer.description());
     std::vector<JournalEntry> entries;
     for (std::size_t k = 0; k < i; ++k) journal.decode(parts[k].bytes, entries);
-    journal.decode(RawJournal(*observer, parts[i].first).read(kMuch).bytes, entries);
+    journal.decode(RawJournal(observer, parts[i].first).read(kMuch).bytes, entries);
     EXPECT_EQ(facts_of(entries), facts_of(there)) << i;
   }
-}
-
-TEST_F(RecordedJournalTest, EntriesBeforeTheFirstAreNotReturned) {
-  play(20);
-  RawJournal raw(*observer, 0);
-  std::vector<JournalEntry> entries;
-  RecordedJournal(description(), 60).decode(raw.read(kMuch).bytes, entries);
-  ASSERT_FALSE(entries.empty());
-  EXPECT_GE(entries.front().number, 60U);
-  EXPECT_EQ(entries.front().missed, 0U);
 }
 
 /// In the row before an end in order nobody polls any more for a halt of its driver.
