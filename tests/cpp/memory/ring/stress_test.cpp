@@ -29,6 +29,15 @@ NarrowRow narrow_row(Iteration k) {
 
 std::byte* bytes_of(NarrowRow& row) { return reinterpret_cast<std::byte*>(row.data()); }
 
+SegmentSpec spec_of_stress() {
+  return {.name = "arm",
+          .schema = {},
+          .row_bytes = 8 * kNarrowWords,
+          .rows = 4,
+          .lanes = 4,
+          .lane_blocks = 8};
+}
+
 class StressTest : public SegmentTest {
  protected:
   void publish(Iteration k) {
@@ -37,12 +46,7 @@ class StressTest : public SegmentTest {
     wake_sleepers(segment_.view(), {.rows = signal_.announce(k)});
   }
 
-  OwnedSegment segment_ = running_segment({.name = "arm",
-                                           .schema = {},
-                                           .row_bytes = 8 * kNarrowWords,
-                                           .rows = 4,
-                                           .lanes = 4,
-                                           .lane_blocks = 8});
+  OwnedSegment segment_ = running_segment(spec_of_stress());
   HistoryWriter writer_{segment_.view()};
   RowSignal signal_{segment_.view()};
 };
@@ -174,12 +178,7 @@ TEST_F(StressTest, ANameIsTakenOverWhileOthersFollowIt) {
     starters.emplace_back([&] {
       while (reigns < kSuccessors) {
         try {
-          OwnedSegment own = running_segment({.name = "arm",
-                                              .schema = {},
-                                              .row_bytes = 8 * kNarrowWords,
-                                              .rows = 4,
-                                              .lanes = 1,
-                                              .lane_blocks = 8});
+          OwnedSegment own = running_segment(spec_of_stress());
           HistoryWriter writer(own.view());
           RowSignal signal(own.view());
           for (Iteration k = 0; k < 20; ++k) {
