@@ -78,7 +78,6 @@ TEST(Pace, ASpeedIsThatOfTheFirstNumberTheCommandNames) {
   }
 }
 
-// rule C7
 TEST(Pace, AMotionThatIsTurnedBackIsNoFasterThanItsSpeed) {
   for (const bool limited : {false, true}) {
     Schema schema = plain_robot(1);
