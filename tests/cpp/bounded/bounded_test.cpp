@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "bounded/counted_work.hpp"
-#include "control/rig.hpp"
+#include "control/chunk_rig.hpp"
 
 namespace o80::test {
 namespace {
@@ -181,16 +181,10 @@ TEST_F(BoundedTest, CheckingGarbage) {
 
 /// Looks at blocks while a chunk is taken and begins, so many of its rows being late.
 std::uint32_t visits_of_a_chunk(std::uint32_t rows, std::uint32_t late) {
-  Rig rig(plain_robot(1), kLane);
-  const StateLayout layout(rig.schema, rig.schema.actuators[0].type);
-  while (rig.next < 2000) rig.step();
-  std::vector<std::uint32_t> due(rows);
-  for (std::uint32_t i = 0; i < rows; ++i) due[i] = i + 1;
-  const auto targets = bytes_of(std::vector<double>(rows, 1.0));
-  const std::vector<BatchBuilder::Member> members{{{}, {}, targets}};
-  const std::vector<const StateLayout*> layouts{&layout};
+  ChunkRig rig(plain_robot(1), kLane);
+  rig.run_to(2000);
   const ChunkHead chunk{.anchor = rig.next - 1 - Iteration{late}, .ease = 1, .fixed = 1};
-  rig.batch.chunk(members, chunk, due, layouts);
+  rig.add_chunk(std::vector(rows, 1.0), every(1, rows), chunk, Profile::linear);
   const BlockIndex batch = rig.send();
   while (!rig.check(0, batch, kBudget)) {
   }
@@ -224,14 +218,9 @@ TEST(BoundedChunk, TakingItLooksAtNearlyAsManyBlocksHoweverManyRowsItHasOrAreLat
 TEST(BoundedChunk, CheckingAndBeginningLargeStatesLooksAtEachBlockAFewTimes) {
   constexpr std::uint32_t kNumbers = 800;
   constexpr std::uint32_t kRows = 24;
-  Rig rig(plain_robot(1, kNumbers), kLane);
-  const StateLayout layout(rig.schema, rig.schema.actuators[0].type);
-  std::vector<std::uint32_t> due(kRows);
-  for (std::uint32_t i = 0; i < kRows; ++i) due[i] = 2 * i + 2;
-  const auto targets = bytes_of(std::vector<double>(kRows * kNumbers, 1.0));
-  const std::vector<BatchBuilder::Member> members{{{}, {}, targets}};
-  const std::vector<const StateLayout*> layouts{&layout};
-  rig.batch.chunk(members, {.anchor = 0, .ease = 1}, due, layouts);
+  ChunkRig rig(plain_robot(1, kNumbers), kLane);
+  rig.add_chunk(std::vector(kRows * kNumbers, 1.0), every(2, kRows), {.anchor = 0, .ease = 1},
+                Profile::linear);
   const BlockIndex batch = rig.send();
   work_since_last_asked();
   constexpr std::uint32_t kShare = 256;

@@ -3,8 +3,6 @@
 #include <utility>
 #include <vector>
 
-#include "control/motion/visit_block.hpp"
-
 namespace {
 
 std::vector<std::uint32_t> visited_in(1U << 18);  // the period in which a block was last seen
@@ -20,27 +18,7 @@ void visit_block(std::uint32_t block) noexcept {
   if (std::exchange(visited_in[block], period) != period) ++work.blocks;
 }
 
-void count(Work what) noexcept {
-  switch (what) {
-    case Work::batch_taken:
-      ++work.batches;
-      break;
-    case Work::status_told:
-      ++work.statuses;
-      break;
-    case Work::queue_dropped:
-      ++work.drops;
-      break;
-    case Work::speed_change:
-      ++work.speed_changes;
-      break;
-    case Work::trapezoid:
-      ++work.trapezoids;
-      break;
-    case Work::smooth_motion:
-      ++work.smooth_motions;
-  }
-}
+void count(Work what) noexcept { ++work.counts.at(static_cast<std::size_t>(what)); }
 
 test::CountedWork test::work_since_last_asked() noexcept {
   ++period;

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+
+#include "control/motion/visit_block.hpp"
 
 namespace o80::test {
 
@@ -8,12 +12,9 @@ namespace o80::test {
 struct CountedWork {
   std::uint32_t blocks = 0;  // different ones, that were looked at
   std::uint32_t visits = 0;  // looks at blocks
-  std::uint32_t batches = 0;
-  std::uint32_t statuses = 0;
-  std::uint32_t drops = 0;          // of an actuator's queue
-  std::uint32_t speed_changes = 0;  // planned
-  std::uint32_t trapezoids = 0;     // tried for them
-  std::uint32_t smooth_motions = 0;
+  std::array<std::uint32_t, 6> counts{};
+
+  std::uint32_t operator[](Work what) const { return counts.at(static_cast<std::size_t>(what)); }
 };
 
 /// Since this was last asked.

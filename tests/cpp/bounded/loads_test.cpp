@@ -33,22 +33,21 @@ struct Most {
     journal = std::max(journal, journalled);
     work.blocks = std::max(work.blocks, of.blocks);
     work.visits = std::max(work.visits, of.visits);
-    work.batches = std::max(work.batches, of.batches);
-    work.statuses = std::max(work.statuses, of.statuses);
-    work.drops = std::max(work.drops, of.drops);
+    std::ranges::transform(work.counts, of.counts, work.counts.begin(), std::ranges::max);
     requests = std::max(requests, served);
   }
   /// One number for a search; about the processor time each of them takes.
   std::uint32_t sum() const {
-    return work.visits + 4 * work.batches + 4 * work.statuses + 4 * work.drops + 16 * requests;
+    return work.visits + 16 * requests +
+           4 * (work[Work::batch_taken] + work[Work::status_told] + work[Work::queue_dropped]);
   }
 };
 
 std::ostream& operator<<(std::ostream& out, const Most& most) {
   return out << most.work.blocks << " blocks, " << most.work.visits << " looks at them, "
-             << most.work.batches << " batches, " << most.work.statuses << " statuses, "
-             << most.work.drops << " drops, " << most.requests << " requests, " << most.journal
-             << " bytes of journal";
+             << most.work[Work::batch_taken] << " batches, " << most.work[Work::status_told]
+             << " statuses, " << most.work[Work::queue_dropped] << " drops, " << most.requests
+             << " requests, " << most.journal << " bytes of journal";
 }
 
 /// Work units an iteration may use: its share, what is staged ahead, express batches, and one batch
@@ -62,9 +61,9 @@ void expect_bounded(const Most& most, std::uint32_t actuators, const std::string
   const std::uint32_t dearest = kParts * 8 * actuators;
   EXPECT_LE(most.work.blocks, kUnits + 1024 + dearest) << what << ": " << most;
   EXPECT_LE(most.work.visits, 10 * (kUnits + 1024 + dearest)) << what << ": " << most;
-  EXPECT_LE(most.work.batches, kUnits / 6 + 1) << what << ": " << most;
-  EXPECT_LE(most.work.statuses, kUnits + 1024 + dearest) << what << ": " << most;
-  EXPECT_LE(most.work.drops, kUnits + dearest) << what << ": " << most;
+  EXPECT_LE(most.work[Work::batch_taken], kUnits / 6 + 1) << what << ": " << most;
+  EXPECT_LE(most.work[Work::status_told], kUnits + 1024 + dearest) << what << ": " << most;
+  EXPECT_LE(most.work[Work::queue_dropped], kUnits + dearest) << what << ": " << most;
   EXPECT_LE(most.requests, 8U) << what << ": " << most;
   // blocks as they were staged; statuses of lanes in turn; a few entries for each batch
   EXPECT_LE(most.journal,
@@ -86,6 +85,19 @@ class JournalWatch {
   std::uint64_t before_ = segment_.view().counters().journal.published.load();
 };
 
+/// An iteration of the robot, of which `most` sees the work.
+void iterate(Robot& robot, JournalWatch& journal, Most& most) {
+  const std::uint32_t before = robot.served;
+  robot.iterate();
+  most.see(work_since_last_asked(), robot.served - before, journal.since_last_asked());
+}
+
+std::vector<std::unique_ptr<Sender>> senders_of(std::uint32_t count) {
+  std::vector<std::unique_ptr<Sender>> senders;
+  for (; count > 0; --count) senders.push_back(std::make_unique<Sender>("flooded"));
+  return senders;
+}
+
 class LoadsTest : public ::testing::Test {
  protected:
   PrivateDirectory directory_;
@@ -101,9 +113,7 @@ Most play(Robot& robot, const std::vector<std::unique_ptr<Sender>>& senders, Ite
         senders, [](const auto& sender) { return sender->free_blocks() == sender->blocks(); });
   };
   for (int i = 0; robot.backend.iteration() <= at_least || !all_back(); ++i) {
-    const std::uint32_t before = robot.served;
-    robot.iterate();
-    most.see(work_since_last_asked(), robot.served - before, journal.since_last_asked());
+    iterate(robot, journal, most);
     if (i == 20'000) {
       ADD_FAILURE() << "what was sent is still there";
       break;
@@ -117,20 +127,15 @@ TEST_F(LoadsTest, TheHeaviestOfTheFirstVersionAreBounded) {
   for (const std::uint32_t actuators : {8U, 64U}) {
     for (const flood::Load& load : flood::heaviest_loads()) {
       Robot robot("flooded", actuators);
-      std::vector<std::unique_ptr<Sender>> senders;
-      for (std::uint32_t i = 0; i < load.senders; ++i) {
-        senders.push_back(std::make_unique<Sender>("flooded"));
-      }
+      const auto senders = senders_of(load.senders);
       for (const auto& sender : senders) load.fill(*sender, actuators, flood::kAt);
       const std::string what = load.name + (" of " + std::to_string(actuators));
       // what is queued would run for ever
       JournalWatch journal;
       for (int i = 0; i < 700; ++i) {
         work_since_last_asked();
-        const std::uint32_t before = robot.served;
-        robot.iterate();
         Most most;
-        most.see(work_since_last_asked(), robot.served - before, journal.since_last_asked());
+        iterate(robot, journal, most);
         expect_bounded(most, actuators, what);
         if (HasFailure()) return;
       }
@@ -237,10 +242,7 @@ void fill(Sender& to, const Mix& mix, std::uint32_t actuators, std::mt19937& ran
 Most run(const Mix& mix, std::uint32_t actuators) {
   Robot robot("flooded", actuators, kSearchBlocks);
   std::mt19937 random(7);  // NOLINT(bugprone-random-generator-seed)
-  std::vector<std::unique_ptr<Sender>> senders;
-  for (std::uint32_t i = 0; i < mix.lanes; ++i) {
-    senders.push_back(std::make_unique<Sender>("flooded"));
-  }
+  const auto senders = senders_of(mix.lanes);
   for (const auto& sender : senders) fill(*sender, mix, actuators, random);
   Most most;
   JournalWatch journal;
@@ -250,9 +252,7 @@ Most run(const Mix& mix, std::uint32_t actuators) {
     if (i == kLater / 2) {
       for (const auto& sender : senders) fill(*sender, mix, actuators, random);
     }
-    const std::uint32_t before = robot.served;
-    robot.iterate();
-    most.see(work_since_last_asked(), robot.served - before, journal.since_last_asked());
+    iterate(robot, journal, most);
   }
   return most;
 }

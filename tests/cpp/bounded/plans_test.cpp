@@ -71,9 +71,9 @@ class PlansTest : public testing::Test {
 };
 
 void expect_bounded(const CountedWork& work, std::uint32_t speed_changes) {
-  EXPECT_LE(work.speed_changes, speed_changes);
-  EXPECT_LE(work.trapezoids, kTrapezoids * work.speed_changes);
-  EXPECT_LE(work.smooth_motions, kSmooth);
+  EXPECT_LE(work[Work::speed_change], speed_changes);
+  EXPECT_LE(work[Work::trapezoid], kTrapezoids * work[Work::speed_change]);
+  EXPECT_LE(work[Work::smooth_motion], kSmooth);
 }
 
 TEST_F(PlansTest, AreBoundedFromAnyMotionWithinAnyLimits) {
@@ -131,11 +131,11 @@ TEST_F(PlansTest, OfAnArmUsuallyNeedFewChangesOfSpeed) {
       return iterations;
     };
     for (auto i = some_of(start(0)); i > 0; --i) number.step(-kNoLimit, kNoLimit);
-    from_rest.push_back(work_since_last_asked().speed_changes);
+    from_rest.push_back(work_since_last_asked()[Work::speed_change]);
     for (auto i = some_of(start(0)); i > 0; --i) number.step(-kNoLimit, kNoLimit);
-    moving.push_back(work_since_last_asked().speed_changes);
+    moving.push_back(work_since_last_asked()[Work::speed_change]);
     start(1 + some_of(100));
-    stretched.push_back(work_since_last_asked().speed_changes);
+    stretched.push_back(work_since_last_asked()[Work::speed_change]);
   }
   EXPECT_LE(usual_of(from_rest).median, 3U);
   EXPECT_LE(usual_of(from_rest).p99, 6U);

@@ -59,8 +59,8 @@ class ChunkRig : public Rig {
   }
   /// Adds it to the batch; returns its place there.
   std::uint32_t add_chunk(const std::vector<double>& values, const std::vector<std::uint32_t>& due,
-                          const ChunkHead& head, Profile profile,
-                          const std::vector<std::uint32_t>& actuators) {
+                          const ChunkHead& head, Profile profile = Profile::smooth,
+                          const std::vector<std::uint32_t>& actuators = {0}) {
     const auto bytes = bytes_of(values);
     std::vector<BatchBuilder::Member> members;
     std::vector<const StateLayout*> layouts;
@@ -141,12 +141,6 @@ class ChunkScript {
   std::mt19937 dice_;
   double odd_;
 };
-
-inline Schema limited_robot(const Limits& limits) {
-  Schema schema = plain_robot(1);
-  schema.actuator(0).limits(limits);
-  return schema;
-}
 
 /// [per iteration] at a millisecond.
 inline Limits limits_of(double speed, double acceleration, double jerk = kNoLimit) {

@@ -60,18 +60,36 @@ std::vector<std::byte> bytes_of_one(const T& value) {
   return bytes_of(std::vector<T>{value});
 }
 
-/// A robot of `actuators`, each of `numbers` doubles, iterating every millisecond.
-inline Schema plain_robot(std::uint32_t actuators, std::uint32_t numbers = 1) {
+/// A robot of `actuators` of one type, iterating every millisecond.
+inline Schema robot_of(std::vector<FieldRow> fields, std::uint32_t actuators = 1,
+                       const char* type = "State") {
   Schema schema;
   schema.head.robot = NameText("robot");
   schema.head.period = kMillisecond;
+  schema.add_actuators("joint", schema.add_type(type, std::move(fields)), actuators);
+  return schema;
+}
+/// One of doubles, `numbers` in each actuator.
+inline Schema plain_robot(std::uint32_t actuators, std::uint32_t numbers = 1) {
   std::vector<FieldRow> fields;
   for (std::uint32_t i = 0; i < numbers; ++i) {
     fields.push_back(scalar_field(numbers == 1 ? "" : "x" + std::to_string(i), Kind::float64));
   }
-  const auto type = schema.add_type(numbers == 1 ? "float64" : "State", std::move(fields));
-  schema.add_actuators("joint", type, actuators);
+  return robot_of(std::move(fields), actuators, numbers == 1 ? "float64" : "State");
+}
+inline Schema limited_robot(const Limits& limits) {
+  Schema schema = plain_robot(1);
+  schema.actuator(0).limits(limits);
   return schema;
+}
+
+/// Changes what stands at the beginning of a block.
+template <class T, class Change>
+void edit(Block& block, Change&& change) {
+  T value;
+  std::memcpy(&value, block.bytes.data(), sizeof value);
+  change(value);
+  std::memcpy(block.bytes.data(), &value, sizeof value);
 }
 
 /// Everything the controller told, and whether it told it properly.
@@ -143,6 +161,13 @@ class Rig : public BatchHandler {
     batch.clear();
     return first;
   }
+  /// The batch being built, for tests that spoil its blocks before they place them.
+  std::vector<Block> sealed(CommandId id = 1) {
+    BatchRecord record;
+    record.id = id;
+    const auto blocks = batch.seal(record);
+    return {blocks.begin(), blocks.end()};
+  }
   BlockIndex place(std::span<const Block> blocks) {
     BlockChain chain;
     for (const Block& block : blocks) {
@@ -188,18 +213,13 @@ class Rig : public BatchHandler {
   void observe(std::uint32_t offset, T value) {
     std::memcpy(observed.data() + offset, &value, sizeof value);
   }
-  bool active(std::uint32_t actuator = 0) const {
-    return (controller.active_mask()[actuator / 64] >> (actuator % 64) & 1) != 0;
+  static bool is_set(const std::uint64_t* mask, std::uint32_t actuator) {
+    return (mask[actuator / 64] >> (actuator % 64) & 1) != 0;
   }
-  bool clamped(std::uint32_t actuator = 0) const {
-    return (controller.clamped_mask()[actuator / 64] >> (actuator % 64) & 1) != 0;
-  }
-  bool braking(std::uint32_t actuator = 0) const {
-    return (controller.braking_mask()[actuator / 64] >> (actuator % 64) & 1) != 0;
-  }
-  bool starved(std::uint32_t actuator = 0) const {
-    return (controller.starved_mask()[actuator / 64] >> (actuator % 64) & 1) != 0;
-  }
+  bool active(std::uint32_t i = 0) const { return is_set(controller.active_mask(), i); }
+  bool clamped(std::uint32_t i = 0) const { return is_set(controller.clamped_mask(), i); }
+  bool braking(std::uint32_t i = 0) const { return is_set(controller.braking_mask(), i); }
+  bool starved(std::uint32_t i = 0) const { return is_set(controller.starved_mask(), i); }
   bool all_blocks_back() const { return pool.available() == pool.size(); }
 
   // what a backend does of a batch's requests

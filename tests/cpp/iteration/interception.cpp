@@ -5,29 +5,16 @@
 
 #include <dlfcn.h>
 #include <linux/futex.h>
-#include <pthread.h>
-#include <semaphore.h>
 #include <signal.h>
-#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include <atomic>
-#include <condition_variable>
 #include <cstdarg>
 #include <cstdio>
-#include <cstdlib>
-#include <memory>
-#include <mutex>
-#include <shared_mutex>
 #include <sstream>
-#include <stdexcept>
-#include <thread>
 #include <utility>
-#include <vector>
-
-#include "memory/os/futex.hpp"
 
 namespace o80::test {
 namespace {
@@ -91,6 +78,7 @@ using Words = Word(Word, Word, Word, Word, Word, Word);
     return libc_##id(a, b, c);                                                                    \
   }
 
+// `new` and `delete` come here; so does mapped memory, as a system call
 O80_STAND_BEFORE_LIBC(malloc, "malloc")
 O80_STAND_BEFORE_LIBC(calloc, "calloc")
 O80_STAND_BEFORE_LIBC(realloc, "realloc")
@@ -98,21 +86,6 @@ O80_STAND_BEFORE_LIBC(free, "free")
 O80_STAND_BEFORE_LIBC(memalign, "memalign")
 O80_STAND_BEFORE(aligned_alloc, "aligned_alloc", heap)
 O80_STAND_BEFORE(posix_memalign, "posix_memalign", heap)
-O80_STAND_BEFORE(new_, "_Znwm", heap)
-O80_STAND_BEFORE(new_array, "_Znam", heap)
-O80_STAND_BEFORE(new_aligned, "_ZnwmSt11align_val_t", heap)
-O80_STAND_BEFORE(new_nothrow, "_ZnwmRKSt9nothrow_t", heap)
-O80_STAND_BEFORE(delete_, "_ZdlPv", heap)
-O80_STAND_BEFORE(delete_sized, "_ZdlPvm", heap)
-O80_STAND_BEFORE(delete_array, "_ZdaPv", heap)
-O80_STAND_BEFORE(delete_aligned, "_ZdlPvSt11align_val_t", heap)
-
-O80_STAND_BEFORE(mmap, "mmap", mapping)
-O80_STAND_BEFORE(munmap, "munmap", mapping)
-O80_STAND_BEFORE(mprotect, "mprotect", mapping)
-O80_STAND_BEFORE(madvise, "madvise", mapping)
-O80_STAND_BEFORE(brk, "brk", mapping)
-O80_STAND_BEFORE(sbrk, "sbrk", mapping)
 
 O80_STAND_BEFORE(mutex_lock, "pthread_mutex_lock", lock)
 O80_STAND_BEFORE(mutex_trylock, "pthread_mutex_trylock", lock)

@@ -22,7 +22,7 @@ inline constexpr bool kCallsAreIntercepted = true;
 #endif
 
 /// Kinds of library calls that no iteration makes.
-enum class Kind : std::uint8_t { heap, mapping, lock, exception, text, count };
+enum class Kind : std::uint8_t { heap, lock, exception, text, count };
 
 inline constexpr std::size_t kKinds = static_cast<std::size_t>(Kind::count);
 inline constexpr std::size_t kSystemCalls = 512;

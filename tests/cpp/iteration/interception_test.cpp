@@ -1,16 +1,13 @@
 #include "iteration/interception.hpp"
 
 #include <gmock/gmock.h>
-#include <pthread.h>
 #include <semaphore.h>
-#include <sys/mman.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <condition_variable>
 #include <cstdlib>
-#include <memory>
 #include <mutex>
 #include <shared_mutex>
 #include <stdexcept>
@@ -50,12 +47,11 @@ TEST_F(InterceptionTest, PlainArithmeticCallsNothing) {
 }
 
 TEST_F(InterceptionTest, TheHeapIsSeenByEveryDoor) {
-  EXPECT_GE(calls_in([] { std::vector<int>(100).at(5) = 1; })[Kind::heap], 2U);
-  EXPECT_GE(calls_in([] { std::make_unique<std::string>(100, 'x')->at(5) = 'y'; })[Kind::heap], 4U);
+  EXPECT_EQ(calls_in([] { std::vector<int>(100).at(5) = 1; })[Kind::heap], 2U);
   struct alignas(64) Wide {
     char bytes[64];
   };
-  EXPECT_GE(calls_in([] { std::vector<Wide>(3).at(1).bytes[0] = 1; })[Kind::heap], 2U);
+  EXPECT_EQ(calls_in([] { std::vector<Wide>(3).at(1).bytes[0] = 1; })[Kind::heap], 2U);
   void* volatile kept = nullptr;
   EXPECT_EQ(calls_in([&] {
               kept = std::malloc(10);
@@ -67,14 +63,6 @@ TEST_F(InterceptionTest, TheHeapIsSeenByEveryDoor) {
               std::free(kept);
             })[Kind::heap],
             7U);
-}
-
-TEST_F(InterceptionTest, MappingsAreSeen) {
-  EXPECT_EQ(calls_in([] {
-              void* page = mmap(nullptr, 4096, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-              munmap(page, 4096);
-            })[Kind::mapping],
-            2U);
 }
 
 TEST_F(InterceptionTest, LocksAreSeen) {

@@ -68,6 +68,19 @@ class ChildProcess {
   int said_ = -1;
 };
 
+/// Exit code of a forked process that runs `body`, or -1 if a signal ended it.
+inline int in_child(const std::function<int()>& body) {
+  return ChildProcess([&](const ChildProcess::Ready&) { _exit(body()); }).wait();
+}
+
+inline constexpr uid_t kStranger = 65534;  // "nobody"
+
+/// Goes on as another user and group; false if this user may not.
+inline bool become_a_stranger() {
+  return geteuid() != kStranger && setresgid(kStranger, kStranger, kStranger) == 0 &&
+         setresuid(kStranger, kStranger, kStranger) == 0;
+}
+
 /// For ever, until killed.
 [[noreturn]] inline void pause_for_ever() {
   while (true) pause();

@@ -21,8 +21,6 @@
 
 namespace o80 {
 
-inline constexpr uid_t kStranger = 65534;  // "nobody"
-
 /// Another user who may read what the permissions of the files in a directory let him read, and
 /// does the worst with it: read locks on every byte, also queued behind the locks of others, and
 /// hundreds of threads asleep on the words of the mapped files.
@@ -33,9 +31,7 @@ class HostileObserver {
 
   explicit HostileObserver(const std::string& directory)
       : child_([directory](const ChildProcess::Ready& ready) {
-          if (geteuid() == kStranger || setresgid(kStranger, kStranger, kStranger) != 0 ||
-              setresuid(kStranger, kStranger, kStranger) != 0)
-            _exit(2);
+          if (!become_a_stranger()) _exit(2);
           // with the test, however that ends; to be asked for after a change of user
           prctl(PR_SET_PDEATHSIG, SIGKILL);
           if (harass(directory) == 0) _exit(4);

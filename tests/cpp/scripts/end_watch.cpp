@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <string>
 
@@ -13,9 +12,7 @@ namespace o80::test {
 namespace {
 
 std::string positions(long double is, long double expected) {
-  std::array<char, 120> text{};
-  std::snprintf(text.data(), text.size(), "%.17Lg, not %.17Lg", is, expected);
-  return text.data();
+  return printed("%.17Lg, not %.17Lg", is, expected);
 }
 
 }  // namespace

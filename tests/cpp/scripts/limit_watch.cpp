@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <string>
 
@@ -12,10 +11,7 @@ namespace {
 constexpr long double kPeriod = 1e-3L;
 
 std::string text_of(const char* what, long double value, long double allowed) {
-  std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(), "%s %.12Lg where %.12Lg is allowed", what, value,
-                allowed);
-  return text.data();
+  return printed("%s %.12Lg where %.12Lg is allowed", what, value, allowed);
 }
 
 /// A field that rests follows nothing.
@@ -92,13 +88,9 @@ std::optional<Failure> LimitWatch::bounds(const ScriptWorld& world, std::size_t 
   const NumberTrack& track = world.actuators[actuator].numbers[number];
   const long double highest = std::max<long double>(spec.limits.maximum, track.before);
   const long double lowest = std::min<long double>(spec.limits.minimum, track.before);
-  if (track.now > highest) {
-    return Failure{"bounds", world.where(actuator, number) + text_of("at", track.now, highest)};
-  }
-  if (track.now < lowest) {
-    return Failure{"bounds", world.where(actuator, number) + text_of("at", track.now, lowest)};
-  }
-  return std::nullopt;
+  const long double nearest = std::clamp(track.now, lowest, highest);
+  if (track.now == nearest) return std::nullopt;
+  return Failure{"bounds", world.where(actuator, number) + text_of("at", track.now, nearest)};
 }
 
 std::optional<Failure> LimitWatch::rates(const ScriptWorld& world, std::size_t actuator,

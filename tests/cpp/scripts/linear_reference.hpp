@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "scripts/script.hpp"
-#include "scripts/script_outcome.hpp"
 
 namespace o80::test {
 
@@ -25,7 +24,7 @@ class LinearReference {
   /// Desired, as the field holds it, of every actuator and number.
   const std::vector<std::vector<long double>>& desired() const { return desired_; }
   /// How the commands that were pulsed stand, by their place in the script.
-  const std::map<std::size_t, Outcome>& outcomes() const { return outcomes_; }
+  const std::map<std::size_t, CommandEnd>& outcomes() const { return outcomes_; }
   Iteration iteration() const { return next_ - 1; }
   /// True once a command at a speed would take longer than a plan can: that is rejected, and what
   /// comes after it is not followed here.
@@ -38,7 +37,7 @@ class LinearReference {
     std::vector<std::size_t> places;  // of its members
     std::size_t open = 0;             // of them, that have not ended
     std::size_t arrived = 0;          // of them, first in their queues
-    Outcome end;                      // the first status that is not completed, the last iteration
+    CommandEnd end;                   // the first status that is not completed, the last iteration
   };
   struct Queued {
     std::size_t place;
@@ -80,7 +79,7 @@ class LinearReference {
   std::vector<std::vector<long double>> desired_;
   std::vector<std::vector<const double*>> readings_;      // null: where it is desired
   std::map<std::uint32_t, std::vector<Queued>> batches_;  // of each lane
-  std::map<std::size_t, Outcome> outcomes_;
+  std::map<std::size_t, CommandEnd> outcomes_;
   Iteration next_ = 0;
 };
 

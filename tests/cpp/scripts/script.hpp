@@ -64,6 +64,13 @@ struct ScriptStep {
   std::vector<double> values;  // rows of targets, desired states of restart_with, the reading
 };
 
+/// How a command of a script ended; no status if it has not.
+struct CommandEnd {
+  Status status = Status::none;
+  Iteration iteration = 0;
+  bool operator==(const CommandEnd&) const = default;
+};
+
 /// A robot and what happens to it, iteration by iteration, without a clock.
 ///
 /// It prints itself as a few lines of text.
@@ -83,6 +90,8 @@ void store_as(Kind kind, double value, std::byte* at);
 long double load_as(Kind kind, const std::byte* at);
 /// A value as a field of this kind has it.
 long double as_stored(Kind kind, double value);
+/// As printf writes it.
+[[gnu::format(printf, 1, 2)]] std::string printed(const char* format, ...);
 /// Size of a field of this kind in a script's robot [bytes].
 std::uint32_t bytes_of_kind(Kind kind);
 

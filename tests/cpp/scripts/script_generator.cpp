@@ -421,7 +421,7 @@ RecordHead Generator::any_head(std::uint16_t actuator) {
   switch (dice_.whole(0, 7)) {
     case 0:
       head.pace = Pace::direct;
-      if (!linear_ && dice_.one_in(3)) head.amount = dice_.whole(1, 40) * 1'000'000;
+      if (dice_.one_in(3)) head.amount = dice_.whole(1, 40) * 1'000'000;
       break;
     case 1:
     case 2:

@@ -6,7 +6,6 @@
 #include "scripts/end_watch.hpp"
 #include "scripts/limit_watch.hpp"
 #include "scripts/span_watch.hpp"
-#include "scripts/time_watch.hpp"
 
 namespace o80::test {
 namespace {
@@ -16,8 +15,7 @@ constexpr std::int64_t kLongestMotion = 1'000'000;
 
 class Player {
  public:
-  explicit Player(const Script& script)
-      : world_(script), limits_(world_), spans_(world_), times_(world_) {}
+  explicit Player(const Script& script) : world_(script), limits_(world_), spans_(world_) {}
 
   std::optional<Failure> play() {
     for (std::size_t i = 0; i < world_.script.steps.size(); ++i) {
@@ -39,7 +37,6 @@ class Player {
   LimitWatch limits_;
   SpanWatch spans_;
   EndWatch ends_;
-  TimeWatch times_;
 };
 
 std::optional<Failure> Player::act(const ScriptStep& step, std::size_t place) {
@@ -68,7 +65,6 @@ std::optional<Failure> Player::act(const ScriptStep& step, std::size_t place) {
 void Player::watch_again() {
   limits_.restart(world_);
   spans_.restart(world_);
-  times_.restart(world_);
 }
 
 std::optional<Failure> Player::run(std::int64_t iterations) {
@@ -77,7 +73,6 @@ std::optional<Failure> Player::run(std::int64_t iterations) {
     if (auto failure = limits_.step(world_)) return failure;
     if (auto failure = spans_.step(world_)) return failure;
     if (auto failure = ends_.step(world_)) return failure;
-    if (auto failure = times_.step(world_)) return failure;
   }
   return std::nullopt;
 }

@@ -1,6 +1,7 @@
 // A script as text: one line a step, words and numbers.
 #include <array>
 #include <cmath>
+#include <cstdarg>
 #include <cstdio>
 #include <sstream>
 
@@ -14,11 +15,7 @@ namespace {
 constexpr std::array kKindWords{"boolean", "int8",   "int16",  "int32",   "int64",   "uint8",
                                 "uint16",  "uint32", "uint64", "float32", "float64", "enumeration"};
 
-std::string digits(double value) {
-  std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%.17g", value);
-  return text.data();
-}
+std::string digits(double value) { return printed("%.17g", value); }
 
 void print_number(std::ostringstream& out, const NumberSpec& number) {
   out << "  number " << kKindWords.at(static_cast<std::size_t>(number.kind)) << " at "
@@ -91,6 +88,15 @@ void print_step(std::ostringstream& out, const ScriptStep& step) {
 }
 
 }  // namespace
+
+std::string printed(const char* format, ...) {
+  std::array<char, 160> text{};
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(text.data(), text.size(), format, arguments);
+  va_end(arguments);
+  return text.data();
+}
 
 std::string Script::text() const {
   std::ostringstream out;

@@ -10,7 +10,6 @@
 
 #include "control/rig.hpp"
 #include "scripts/script.hpp"
-#include "scripts/script_outcome.hpp"
 
 namespace o80::test {
 
@@ -32,7 +31,7 @@ struct SentCommand {
   Iteration active_since = kNever;
   Iteration ended_at = kNever;
   bool is_member = false;        // of a command of several actuators
-  Outcome told;                  // the end that was told; of a member, that of all
+  CommandEnd told;               // the end that was told; of a member, that of all
   Reason reason = Reason::none;  // of that end
 
   /// It gave the desired state of this iteration.

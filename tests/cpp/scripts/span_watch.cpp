@@ -1,9 +1,8 @@
 #include "scripts/span_watch.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
+#include <limits>
 #include <utility>
 
 #include "control/motion/fastest_motion.hpp"
@@ -14,6 +13,7 @@ namespace {
 
 constexpr long double kPeriod = 1e-3L;
 constexpr Iteration kSmoothAfter = 5;
+constexpr long double kAnywhere = std::numeric_limits<long double>::infinity();
 constexpr Iteration kAnyTime = std::int64_t{1} << 40;  // [iterations]
 
 /// The number whose speed a command asks for: the first it names that moves.
@@ -82,36 +82,6 @@ long double SpanWatch::seam_speed(const ScriptWorld& world, std::size_t actuator
   return seam;
 }
 
-/// The most iterations to the first row of a curve; those that end within one are passed over.
-long double SpanWatch::first_row(const ScriptStep& step) {
-  if (step.head.pace == Pace::iterations) return std::max<std::int64_t>(1, step.head.amount);
-  constexpr auto kPassed = static_cast<std::int64_t>(1.5e9 * kPeriod);
-  std::int64_t end = 0;
-  for (const std::int64_t time : step.times) {
-    end = time;
-    if (end > kPassed) break;
-  }
-  return static_cast<long double>(end) * 1e-9L / kPeriod + 2.0L;
-}
-
-/// The most by which a smooth curve leaves its rows, and the way to the first one (docs/chunks.md).
-long double SpanWatch::excess_of(const ScriptWorld& world, const SentCommand& command,
-                                 std::size_t n, long double place, long double speed) {
-  const ScriptStep& step = world.step_of(command);
-  const long double first = world.target(command, 0, n);
-  long double largest = 0.0L;
-  for (std::size_t row = 1; row < world.rows_of(command); ++row) {
-    largest = std::max<long double>(
-        largest, std::fabs(world.target(command, row, n) - world.target(command, row - 1, n)));
-  }
-  const long double time = first_row(step);
-  // the slope at the first row is at most twice that of the larger step after it
-  const long double turn = 2.0L * largest * (step.head.pace == Pace::iterations ? 1.0L : time);
-  return std::max(
-      (largest + std::fabs(first - place)) / 2.0L,
-      0.3L * (std::max(std::fabs(first - place), largest) + std::fabs(speed) * time + turn));
-}
-
 void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken_over) {
   const SentCommand& command = *world.actuators[actuator].driver;
   const ScriptStep& step = world.step_of(command);
@@ -135,12 +105,6 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
       span.include(
           stops(number, place, rounding_of(world.script.actuators[actuator].numbers[n], place)));
       span.include(number.targets);
-      if (step.head.profile == Profile::monotone && world.names(command, n)) {
-        const NumberSpec& spec = world.script.actuators[actuator].numbers[n];
-        const long double bend = seam_speed(world, actuator, number, spec) * first_row(step) / 3.0L;
-        span.include(place - bend);
-        span.include(place + bend);
-      }
     }
     Span targets{place, place};
     if (world.names(command, n)) {
@@ -152,13 +116,9 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
       targets.include(as_stored(spec.kind, spec.rest));
     }
     span.include(targets);
-    if (step.head.profile == Profile::smooth && world.names(command, n)) {
-      const NumberSpec& spec = world.script.actuators[actuator].numbers[n];
-      const long double seam = taken_over ? seam_speed(world, actuator, number, spec) : 0.0L;
-      const long double excess = excess_of(world, command, n, place, seam);
-      span.include(span.low - excess);
-      span.include(span.high + excess);
-    }
+    const bool bends = step.head.profile == Profile::smooth ||
+                       (step.head.profile == Profile::monotone && taken_over);
+    if (bends && world.names(command, n)) span = {-kAnywhere, kAnywhere};
     number.span = span;
     number.targets = targets;
 
@@ -247,12 +207,11 @@ std::optional<Failure> SpanWatch::takes_its_time(const ScriptWorld& world,
     return Failure{"time of a plan", world.where(actuator, 0) + "it is late without a reason"};
   }
   if (took <= longest && (!is_set_point || took >= plan.requested)) return std::nullopt;
-  std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(),
-                "%lld iterations; %lld were requested, and %lld are the fewest",
-                static_cast<long long>(took), static_cast<long long>(plan.requested),
-                static_cast<long long>(plan.fewest));
-  return Failure{"time of a plan", world.where(actuator, 0) + text.data()};
+  return Failure{
+      "time of a plan",
+      world.where(actuator, 0) +
+          printed("%jd iterations; %jd were requested, and %jd are the fewest", std::intmax_t{took},
+                  std::intmax_t{plan.requested}, std::intmax_t{plan.fewest})};
 }
 
 std::optional<Failure> SpanWatch::check(const ScriptWorld& world, std::size_t actuator,
@@ -262,16 +221,15 @@ std::optional<Failure> SpanWatch::check(const ScriptWorld& world, std::size_t ac
   const Number& number = numbers_[actuator][n];
   const long double rounding =
       std::max(rounding_of(spec, track.now), rounding_of(spec, track.before));
-  std::array<char, 160> text{};
   const bool has_span = !spec.limited() && !world.script.actuators[actuator].blend;
   const Span& span = plans_[actuator].is_known ? number.planned : number.span;
   if (has_span || plans_[actuator].is_known) {
     const long double slack =
         rounding + 1e-12L * std::max(std::fabs(span.low), std::fabs(span.high));
     if (track.now < span.low - slack || track.now > span.high + slack) {
-      std::snprintf(text.data(), text.size(), "at %.12Lg, outside the span %.12Lg to %.12Lg",
-                    track.now, span.low, span.high);
-      return Failure{"span", world.where(actuator, n) + text.data()};
+      return Failure{
+          "span", world.where(actuator, n) + printed("at %.12Lg, outside the span %.12Lg to %.12Lg",
+                                                     track.now, span.low, span.high)};
     }
   }
   const long double covered = std::fabs(track.now - track.before);
@@ -279,9 +237,9 @@ std::optional<Failure> SpanWatch::check(const ScriptWorld& world, std::size_t ac
   const bool is_followed = spec.limited() && world.rows_of(*world.actuators[actuator].driver) > 1;
   if (number.fastest > 0.0L && !is_followed && !world.script.actuators[actuator].blend &&
       covered > number.fastest * (1.0L + 1e-8L) + 2.0L * rounding) {
-    std::snprintf(text.data(), text.size(), "a step of %.12Lg where its pace allows %.12Lg",
-                  covered, number.fastest);
-    return Failure{"pace", world.where(actuator, n) + text.data()};
+    return Failure{
+        "pace", world.where(actuator, n) + printed("a step of %.12Lg where its pace allows %.12Lg",
+                                                   covered, number.fastest)};
   }
   return std::nullopt;
 }

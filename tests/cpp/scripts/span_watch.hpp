@@ -13,9 +13,9 @@ namespace o80::test {
 /// The span of a motion is that of its present place, its targets, and, if it overwrote another
 /// motion, of the former target and of every place where the former motion could have come to
 /// stop: those that a braking velocity can reach from the present place without leaving the former
-/// span. A curve through rows goes on by a third of its first row at the present speed. That of a
-/// planned motion within limits is exact: the present place, its target, and where the fastest stop
-/// from here ends and turns.
+/// span. Curves that leave it (`smooth`, and `monotone` from another motion) are not judged here,
+/// but by tests/cpp/control/motion/rows_curve_test.cpp. That of a planned motion within limits is
+/// exact: the present place, its target, and where the fastest stop from here ends and turns.
 class SpanWatch {
  public:
   explicit SpanWatch(const ScriptWorld& world);
@@ -53,9 +53,6 @@ class SpanWatch {
   static bool is_planned(const ScriptWorld& world, const SentCommand& command);
   void plan(const ScriptWorld& world, std::size_t actuator);
   std::optional<Failure> takes_its_time(const ScriptWorld& world, std::size_t actuator) const;
-  static long double first_row(const ScriptStep& step);
-  static long double excess_of(const ScriptWorld& world, const SentCommand& command, std::size_t n,
-                               long double place, long double speed);
   static long double seam_speed(const ScriptWorld& world, std::size_t actuator,
                                 const Number& number, const NumberSpec& spec);
   void begin(const ScriptWorld& world, std::size_t actuator, bool taken_over);

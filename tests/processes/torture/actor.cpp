@@ -177,6 +177,12 @@ bool Actor::a_successor_was_stopped() const {
   });
 }
 
+bool is_refusal(const o80::Error& error) {
+  return dynamic_cast<const o80::LaneFull*>(&error) != nullptr ||
+         dynamic_cast<const o80::NoLane*>(&error) != nullptr ||
+         std::string_view(error.what()).find("exclusive control") != std::string_view::npos;
+}
+
 std::uint64_t epoch_of(const std::string& segment) {
   o80::SegmentHeader header{};
   const int file = open(o80::segment_path(segment).c_str(), O_RDONLY | O_CLOEXEC);

@@ -123,6 +123,9 @@ class Actor {
   int schedule_;
 };
 
+/// Whether the lanes were full, or somebody has control: nothing was sent, and that passes.
+bool is_refusal(const o80::Error& error);
+
 /// The name of a segment in the directory of a round.
 inline std::string segment_name(std::uint32_t segment) { return "robot" + std::to_string(segment); }
 

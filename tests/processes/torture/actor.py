@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import chain
 from typing import Any
 
 import o80
@@ -136,26 +137,19 @@ def verify(actor: Actor, generation: int, observation: Any, iteration: int | Non
     """A row is what it says of itself, and what the driver noted."""
     k = observation.iteration
     sensors = observation.extended
+    filler = [mix(generation << 40 ^ k, i) for i in range(len(sensors["filler"]))]
+    states = [
+        struct.unpack("<2Q", values.astype("<f8").tobytes())
+        for values in (observation.desired, observation.observed)
+    ]
     digest = mix(generation, k) ^ mix(int(sensors["chain"]), 1)
-    expected = [mix(generation << 40 ^ k, i) for i in range(len(sensors["filler"]))]
-    for value in expected:
+    for value in (*filler, *chain.from_iterable(zip(*states, strict=True))):
         digest = mix(digest, value)
-    desired = struct.unpack("<2Q", observation.desired.astype("<f8").tobytes())
-    observed = struct.unpack("<2Q", observation.observed.astype("<f8").tobytes())
-    for pair in zip(desired, observed, strict=True):
-        for bits in pair:
-            digest = mix(digest, bits)
     noted = actor.read(
         "journal", "<Q", generation * actor.at["life_stride"] + k * actor.at["journal_stride"]
     )
-    same = [int(value) for value in sensors["filler"]] == expected
-    if (
-        (iteration is not None and k != iteration)
-        or int(sensors["generation"]) != generation
-        or not same
-        or int(sensors["digest"]) != digest
-        or noted != digest
-    ):
+    found = (sensors["generation"], [*sensors["filler"]], sensors["digest"], noted)
+    if found != (generation, filler, digest, digest) or iteration not in (None, k):
         actor.fail(WRONG_ROW, f"row {k} of generation {generation}, asked for as {iteration}")
     actor.count("rows")
 
@@ -197,10 +191,10 @@ class Ledger:
     def outcome(self, base: int, sent: int) -> None:
         struct.pack_into("<I", self.actor.board, base, sent)
 
-    def settle(self, base: int, handles: Any) -> None:
+    def settle(self, base: int, batch: Any) -> None:
         actor = self.actor
         first = struct.unpack_from("<I", actor.board, base + 12)[0]
-        for i, handle in enumerate(handles):
+        for i, handle in enumerate(batch.handles):
             at = actor.at["sent_commands"] + (first + i) * actor.at["command_stride"]
             iteration = -1 if handle.iteration is None else handle.iteration
             told = STATUSES.index(handle.status)
@@ -236,15 +230,13 @@ def command(actor: Actor, robot: o80.Frontend, generation: int) -> None:
                     if (robot.bursting)
                     else robot.pulse()
                 )
-            except (o80.LaneFull, o80.NoLane):
+            except (o80.LaneFull, o80.NoLane, o80.BackendGone) as error:
                 ledger.outcome(base, REFUSED)
                 robot.forget_added()
+                if isinstance(error, o80.BackendGone):
+                    raise
                 time.sleep(0.002)
                 continue
-            except o80.BackendGone:
-                ledger.outcome(base, REFUSED)
-                robot.forget_added()
-                raise
             ledger.outcome(base, SENT)
             open_batches.append((base, batch))
             timeout = actor.timeout()
@@ -254,14 +246,10 @@ def command(actor: Actor, robot: o80.Frontend, generation: int) -> None:
             except o80.TimeoutError:
                 actor.count("timeouts")
             while len(open_batches) > 20:
-                ledger.settle(*_handles(open_batches.pop(0)))
+                ledger.settle(*open_batches.pop(0))
     finally:
         for entry in open_batches:
-            ledger.settle(*_handles(entry))
-
-
-def _handles(entry: tuple[int, Any]) -> tuple[int, Any]:
-    return entry[0], entry[1].handles
+            ledger.settle(*entry)
 
 
 def read(actor: Actor, robot: o80.Frontend, generation: int) -> None:

@@ -36,7 +36,7 @@ Arena::~Arena() {
 
 void Arena::fail(Fault fault, const std::string& text) {
   ++tally_.failures[fault];
-  std::printf("FAILED (%s): %s\n  in %s\n", name_of(fault), text.c_str(), replay_.c_str());
+  std::printf("FAILED (%s): %s\n  in %s\n", name_of(fault).c_str(), text.c_str(), replay_.c_str());
   std::fflush(stdout);
 }
 
@@ -160,7 +160,7 @@ void Arena::work(std::int64_t now) {
   if (now >= phase_ends_) {
     for (const auto& [pid, running] : running_) {
       const char* call = running.slot->call;
-      fail(Fault::hang, std::string(name_of(running.slot->role)) + " (pid " + std::to_string(pid) +
+      fail(Fault::hang, name_of(running.slot->role) + " (pid " + std::to_string(pid) +
                             ") did not come to its end" +
                             (call != nullptr ? std::string("; last call: ") + call : ""));
     }
@@ -197,7 +197,7 @@ void Arena::finish() {
   for (const Failure& failure : judge(*round_)) fail(failure.fault, failure.text);
   ++tally_.rounds;
   tally_.commands += commands_of(*round_);
-  tally_.halts += halts_of(*round_);
+  count_halts(*round_, tally_.halts);
   for (std::uint32_t i = 0; i < actors_; ++i) {
     const Slot& slot = round_->slots[i];
     tally_.calls += slot.calls;

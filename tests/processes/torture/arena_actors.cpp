@@ -37,7 +37,8 @@ void after_label() { own_slot->continued_at(o80::monotonic_now()); }
 }  // namespace
 
 void Arena::arm(Slot& slot) {
-  const auto labels = labels_of(slot.role);
+  const bool as_any_backend = slot.role == Role::bursting_backend && chance_.percent(70);
+  const auto labels = labels_of(as_any_backend ? Role::backend : slot.role);
   if (labels.empty() || !chance_.percent(55)) return;
   const Label& label = labels[chance_.below(labels.size())];
   std::snprintf(slot.label, sizeof slot.label, "%s", label.name);
@@ -181,11 +182,9 @@ bool Arena::told(pid_t pid, int status, std::int64_t now) {
     const bool by_label = slot.label_reached != 0 && slot.label_signal == SIGKILL;
     ++tally_.kills_by_label[by_label ? slot.label : "(at random)"];
   } else if (WIFSIGNALED(status)) {
-    fail(Fault::crash,
-         std::string(name_of(slot.role)) + " died of signal " + std::to_string(WTERMSIG(status)));
+    fail(Fault::crash, name_of(slot.role) + " died of signal " + std::to_string(WTERMSIG(status)));
   } else if (WEXITSTATUS(status) != 0) {
-    fail(Fault::crash,
-         std::string(name_of(slot.role)) + " ended with " + std::to_string(WEXITSTATUS(status)));
+    fail(Fault::crash, name_of(slot.role) + " ended with " + std::to_string(WEXITSTATUS(status)));
   }
   if (is_backend(slot.role)) round_->lives[slot.generation].dead_at = now;
   for (auto& [other, entry] : running_)

@@ -74,9 +74,8 @@ void Arena::watch_for_hangs(std::int64_t now) {
     const std::int64_t ends = slot.call_ends;
     if (ends == 0 || running.stopped || running.killed || slot.is_stopped()) continue;
     if (now - ends - slot.stopped_for(now) < kPatience) continue;
-    fail(Fault::hang, std::string(name_of(slot.role)) + " (pid " + std::to_string(pid) +
-                          ") is in " + (slot.call != nullptr ? slot.call.load() : "a call") +
-                          " since long");
+    fail(Fault::hang, name_of(slot.role) + " (pid " + std::to_string(pid) + ") is in " +
+                          (slot.call != nullptr ? slot.call.load() : "a call") + " since long");
     kill_one(running, now);
   }
 }

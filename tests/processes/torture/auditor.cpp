@@ -81,27 +81,19 @@ class Auditor {
     }
   }
 
-  /// Somebody has control: the dead may hold it for a moment yet.
-  static bool is_of_control(const o80::Error& error) {
-    return std::string_view(error.what()).find("exclusive control") != std::string_view::npos;
-  }
-
   /// The dead hold nothing for long: neither lanes nor control.
   void be_heard(o80::UntypedFrontend& frontend) {
     actor_.slot.call = "pulse of the auditor";
     const std::int64_t began = o80::monotonic_now();
-    std::string refusal = "the lanes were taken";
+    std::string refusal;
     while (o80::monotonic_now() - began < 10'000 * kMillisecond) {
       try {
         frontend.add_purge_own();
         frontend.pulse().wait(std::chrono::seconds(10));
         return;
-      } catch (const o80::LaneFull&) {
-        frontend.forget_added();
-      } catch (const o80::NoLane&) {
-        frontend.forget_added();
       } catch (const o80::Error& error) {
-        if (!is_of_control(error)) throw;
+        if (!is_refusal(error)) throw;
+        frontend.forget_added();
         refusal = error.what();
       }
       actor_.pause(kMillisecond);
@@ -114,27 +106,18 @@ class Auditor {
   void burst_until_drained(Kept& kept) {
     actor_.slot.call = "burst of the auditor";
     std::int64_t refused_since = 0;
-    const auto refused = [&](const char* why) {
-      if (refused_since == 0) refused_since = o80::monotonic_now();
-      if (o80::monotonic_now() - refused_since > 10'000 * kMillisecond)
-        actor_.fail(Fault::hang, "nobody is heard after the dead: %s", why);
-      actor_.pause(kMillisecond);
-    };
     while (!drained(kept.frontend)) {
       try {
         kept.frontend.burst(100, std::chrono::seconds(10));
         refused_since = 0;
-      } catch (const o80::LaneFull& error) {
-        refused(error.what());
       } catch (const o80::BackendHalted&) {
         // a commander died meanwhile, say: bursts are served all the same
-      } catch (const o80::BackendGone&) {
-        throw;
-      } catch (const o80::TimeoutError&) {
-        throw;
       } catch (const o80::Error& error) {
-        if (!is_of_control(error)) throw;
-        refused(error.what());
+        if (!is_refusal(error)) throw;
+        if (refused_since == 0) refused_since = o80::monotonic_now();
+        if (o80::monotonic_now() - refused_since > 10'000 * kMillisecond)
+          actor_.fail(Fault::hang, "nobody is heard after the dead: %s", error.what());
+        actor_.pause(kMillisecond);
       }
     }
   }
@@ -151,8 +134,7 @@ class Auditor {
 
   void audit(Kept& kept) {
     for (Slot& slot : actor_.round.slots) {
-      for (std::uint32_t i = 0; i < slot.batches; ++i) {
-        const SentBatch& batch = slot.sent_batches[i];
+      for (const SentBatch& batch : slot.sent()) {
         if (batch.generation != kept.generation ||
             batch.sent != static_cast<std::uint32_t>(Sent::sent) || batch.lane == kNoLane)
           continue;

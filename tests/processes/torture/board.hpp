@@ -3,10 +3,14 @@
 // What all processes of a round share beside the segments: it outlives every kill, and the judge
 // reads it afterwards. Plain words in a file of its own, so that actors in Python can write it too.
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <span>
+#include <string>
 
+#include "o80/describe/options.hpp"
 #include "torture/robot.hpp"
 
 namespace torture {
@@ -37,7 +41,8 @@ enum class Role : std::uint32_t {
   python_reader,
   count
 };
-const char* name_of(Role role);
+O80_DESCRIBE_ENUM(Role, backend, bursting_backend, commander, burster, group_burster, halter,
+                  reader, auditor, usurper, python_commander, python_reader);
 constexpr bool is_backend(Role role) {
   return role == Role::backend || role == Role::bursting_backend;
 }
@@ -63,7 +68,13 @@ enum class Fault : std::uint32_t {
   left_over,
   count
 };
-const char* name_of(Fault fault);
+O80_DESCRIBE_ENUM(Fault, none, hang, wrong_row, lost, doubled, falsely_told, false_death,
+                  unnoticed_death, taken_alive, bad_error, crash, halt_broken, left_over);
+
+template <class Enum>
+std::string name_of(Enum value) {
+  return o80::describing::option_text(value);
+}
 
 /// One iteration as the driver saw it; written before the row is published.
 struct JournalRow {
@@ -115,6 +126,11 @@ struct Generation {
   std::atomic<std::uint32_t> resumed;
   std::array<ServedResume, kMaxResumes> resumes;
   std::array<JournalRow, kMaxRows> journal;
+
+  /// The rows that its driver saw.
+  std::span<const JournalRow> seen() const {
+    return {journal.data(), std::min(static_cast<std::size_t>(rows.load()), journal.size())};
+  }
 };
 
 inline constexpr std::uint32_t kNoLane = 0xFFFFFFFF;
@@ -217,6 +233,15 @@ struct Slot {
   std::atomic<std::uint32_t> halted_in_control;
   std::array<RequestedHalt, kMaxHalts> requested_halts;
   std::array<AskedResume, kMaxResumes> requested_resumes;
+
+  std::span<SentBatch> sent() { return {sent_batches.data(), batches}; }
+  std::span<const SentBatch> sent() const { return {sent_batches.data(), batches}; }
+  std::span<SentCommand> sent_in(const SentBatch& batch) {
+    return std::span(sent_commands).subspan(batch.first_command, batch.commands);
+  }
+  std::span<const SentCommand> sent_in(const SentBatch& batch) const {
+    return std::span(sent_commands).subspan(batch.first_command, batch.commands);
+  }
 
   void stops(std::int64_t now) { stopped.fetch_sub(now); }
   void continued_at(std::int64_t now) { stopped.fetch_add(now); }

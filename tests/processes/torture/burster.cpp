@@ -8,6 +8,20 @@ namespace torture {
 
 namespace {
 
+/// Waits for the end of a burst, and verifies its last row.
+void await(Actor& actor, Sender& sender, const o80::Burst& burst, Verifier& verifier) {
+  const auto timeout = actor.some_timeout();
+  const o80::Iteration row =
+      actor.timed("burst.wait", timeout, [&] { return burst.wait_done(timeout); });
+  if (row < 0) return;
+  sender.entry().burst_row = row;
+  const o80::Rows rows = sender.frontend().history(row, row);
+  if (rows.count == 1) verifier.verify(rows.row(0).data(), row);
+  if (rows.count == 0 && sender.frontend().published() < row)
+    actor.fail(Fault::falsely_told, "a burst ended with row %ld, which is not there",
+               static_cast<long>(row));
+}
+
 class Burster {
  public:
   explicit Burster(Actor& actor) : actor_(actor) {}
@@ -36,17 +50,8 @@ class Burster {
   }
 
   void wait(Sender& sender, const o80::Burst& burst, Verifier& verifier, std::int64_t stopped) {
-    const auto timeout = actor_.some_timeout();
     try {
-      const o80::Iteration row =
-          actor_.timed("burst.wait", timeout, [&] { return burst.wait_done(timeout); });
-      if (row < 0) return;
-      sender.entry().burst_row = row;
-      const o80::Rows rows = sender.frontend().history(row, row);
-      if (rows.count == 1) verifier.verify(rows.row(0).data(), row);
-      if (rows.count == 0 && sender.frontend().published() < row)
-        actor_.fail(Fault::falsely_told, "a burst ended with row %ld, which is not there",
-                    static_cast<long>(row));
+      await(actor_, sender, burst, verifier);
     } catch (const o80::TimeoutError&) {
       actor_.judge_timeout(sender.life(), call_began_, stopped);
     } catch (const o80::BackendHalted&) {
@@ -107,15 +112,9 @@ class GroupBurster {
       ++actor_.slot.bursts_halted;
     } catch (const o80::RowOverwritten&) {
       // others were faster
-    } catch (const o80::LaneFull&) {
-      // one of them stands still
-      actor_.pause(kMillisecond);
-    } catch (const o80::NoLane&) {
-      actor_.pause(kMillisecond);
-    } catch (const o80::BackendGone&) {
-      throw;
     } catch (const o80::Error& error) {
-      if (std::string(error.what()).find("exclusive") == std::string::npos) throw;
+      if (!is_refusal(error)) throw;
+      actor_.pause(kMillisecond);  // one of them may stand still
     }
     for (Sender* sender : both) {
       sender->settle();
@@ -141,16 +140,8 @@ class GroupBurster {
       if (both[i]->open_commands() < 60) both[i]->add_some();
       bursts[i] = both[i]->burst(actor_.chance.between(1, 8));
     }
-    for (std::size_t i = 0; i < 2; ++i) {
-      if (!bursts[i]) continue;
-      const auto timeout = actor_.some_timeout();
-      const o80::Iteration row =
-          actor_.timed("burst.wait", timeout, [&] { return bursts[i]->wait_done(timeout); });
-      if (row < 0) continue;
-      both[i]->entry().burst_row = row;
-      const o80::Rows rows = both[i]->frontend().history(row, row);
-      if (rows.count == 1) verifiers[i].verify(rows.row(0).data(), row);
-    }
+    for (std::size_t i = 0; i < 2; ++i)
+      if (bursts[i]) await(actor_, *both[i], *bursts[i], verifiers[i]);
   }
 
   Actor& actor_;

@@ -68,8 +68,6 @@ void resume(Actor& actor, o80::UntypedFrontend& frontend, std::int64_t& call_beg
   if (guesses) entry.number += actor.chance.percent(50) ? 1 : -1ULL;
   entry.resumed = static_cast<std::uint32_t>(Resumed::unknown);
   actor.slot.resumes = place + 1;
-  const auto refused = [&] { entry.resumed = static_cast<std::uint32_t>(Resumed::refused); };
-
   const auto timeout = actor.some_timeout();
   actor.slot.commanding = 1;
   call_began = o80::monotonic_now();
@@ -77,19 +75,11 @@ void resume(Actor& actor, o80::UntypedFrontend& frontend, std::int64_t& call_beg
     actor.timed("resume", timeout, [&] { frontend.resume(entry.number, timeout); });
     if (!guesses) entry.returned_at = o80::monotonic_now();
     entry.resumed = static_cast<std::uint32_t>(Resumed::done);
-  } catch (const o80::BackendHalted&) {
-    refused();
-  } catch (const o80::LaneFull&) {
-    refused();
-  } catch (const o80::NoLane&) {
-    refused();
   } catch (const o80::TimeoutError&) {
     // it may be taken yet
-  } catch (const o80::BackendGone&) {
-    throw;
   } catch (const o80::Error& error) {
-    if (std::string(error.what()).find("exclusive") == std::string::npos) throw;
-    refused();
+    if (dynamic_cast<const o80::BackendHalted*>(&error) == nullptr && !is_refusal(error)) throw;
+    entry.resumed = static_cast<std::uint32_t>(Resumed::refused);
   }
 }
 

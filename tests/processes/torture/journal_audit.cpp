@@ -27,8 +27,7 @@ class JournalAudit {
   }
 
   void compare(const Slot& slot) {
-    for (std::uint32_t i = 0; i < slot.batches; ++i) {
-      const SentBatch& batch = slot.sent_batches[i];
+    for (const SentBatch& batch : slot.sent()) {
       if (batch.generation != generation_ || batch.lane == kNoLane ||
           batch.sent != static_cast<std::uint32_t>(Sent::sent))
         continue;

@@ -37,12 +37,11 @@ void keep_at(std::int64_t iteration, std::vector<Done>& done) {
 class Deeds {
  public:
   explicit Deeds(const Generation& life) {
-    const std::int64_t rows = std::min<std::int64_t>(life.rows, kMaxRows);
-    for (std::int64_t k = 0; k < rows; ++k) {
-      const JournalRow& row = life.journal[static_cast<std::size_t>(k)];
+    for (std::int64_t k = 0; const JournalRow& row : life.seen()) {
       for (std::uint32_t i = 0; i < kActuators; ++i)
         if ((row.active >> i & 1) != 0)
           done_.push_back({std::bit_cast<std::uint64_t>(row.desired[i]), k, i, k});
+      ++k;
     }
     for (std::uint32_t i = 0; i < life.served; ++i) {
       const ServedRequest& request = life.requests[i];
@@ -80,12 +79,7 @@ bool has_ended(std::uint32_t status) {
   return known != Status::forgotten && o80::is_end(known);
 }
 
-const char* name_of(Status status) {
-  static constexpr const char* kNames[] = {"none",        "queued", "active",      "completed",
-                                           "overwritten", "purged", "interrupted", "rejected",
-                                           "forgotten",   "halted"};
-  return kNames[static_cast<std::size_t>(status)];
-}
+std::string name_of(Status status) { return std::string(o80::to_text(status)); }
 
 class Judge {
  public:
@@ -93,7 +87,7 @@ class Judge {
 
   std::vector<Failure> judge() {
     for (const Slot& slot : round_.slots)
-      for (std::uint32_t i = 0; i < slot.batches; ++i) judge(slot, slot.sent_batches[i]);
+      for (const SentBatch& batch : slot.sent()) judge(slot, batch);
     for (const Slot& slot : round_.slots) {
       judge_order(slot);
       judge_control(slot);
@@ -127,8 +121,7 @@ class Judge {
   }
 
   void judge(const Slot& slot, const SentBatch& batch) {
-    for (std::uint32_t i = 0; i < batch.commands; ++i)
-      judge(slot, batch, slot.sent_commands[batch.first_command + i]);
+    for (const SentCommand& command : slot.sent_in(batch)) judge(slot, batch, command);
     if (batch.burst > 0 && batch.burst_row >= 0) {
       const std::int64_t begun = batch.burst_row - batch.burst + 1;
       bursts_[batch.generation].emplace_back(begun, batch.burst_row);
@@ -302,11 +295,9 @@ class Judge {
   /// What one sender sent for one actuator is done in the order in which it was sent.
   void judge_order(const Slot& slot) {
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::int64_t> last;
-    for (std::uint32_t i = 0; i < slot.batches; ++i) {
-      const SentBatch& batch = slot.sent_batches[i];
+    for (const SentBatch& batch : slot.sent()) {
       if (batch.at >= 0) continue;
-      for (std::uint32_t k = 0; k < batch.commands; ++k) {
-        const SentCommand& command = slot.sent_commands[batch.first_command + k];
+      for (const SentCommand& command : slot.sent_in(batch)) {
         const bool is_group = command.kind == SentKind::group;
         if ((command.kind != SentKind::command && !is_group) ||
             static_cast<Status>(command.told) != Status::completed)
@@ -335,14 +326,11 @@ class Judge {
   /// All that may have been sent through one attachment.
   template <class Visit>
   static void for_each(const Slot& slot, std::uint32_t attachment, SentKind kind, Visit&& visit) {
-    for (std::uint32_t i = 0; i < slot.batches; ++i) {
-      const SentBatch& batch = slot.sent_batches[i];
+    for (const SentBatch& batch : slot.sent()) {
       if (batch.attachment != attachment || batch.sent == static_cast<std::uint32_t>(Sent::refused))
         continue;
-      for (std::uint32_t k = 0; k < batch.commands; ++k) {
-        const SentCommand& command = slot.sent_commands[batch.first_command + k];
+      for (const SentCommand& command : slot.sent_in(batch))
         if (command.kind == kind) visit(batch, command);
-      }
     }
   }
   /// The iteration in which it was done; -1: it was not, `unknown` if nobody knows.
@@ -355,16 +343,14 @@ class Judge {
   /// The last iteration of which it is known that the sender of a batch lived and held its lane.
   std::int64_t lived_until(const Slot& slot, const SentBatch& sent) const {
     std::int64_t seen_at = 0;
-    for (std::uint32_t i = 0; i < slot.batches; ++i)
-      if (slot.sent_batches[i].attachment == sent.attachment)
-        seen_at = std::max(seen_at, slot.sent_batches[i].sent_at);
+    for (const SentBatch& batch : slot.sent())
+      if (batch.attachment == sent.attachment) seen_at = std::max(seen_at, batch.sent_at);
     const bool killed = slot.doomed_at != 0 && slot.commanding != 0;
     if (killed && sent.attachment > slot.closed) seen_at = slot.doomed_at;
-    const Generation& life = round_.lives[sent.generation];
-    const std::int64_t rows = std::min<std::int64_t>(life.rows, kMaxRows);
-    std::int64_t last = -1;
-    while (last + 1 < rows && life.journal[static_cast<std::size_t>(last + 1)].at < seen_at) ++last;
-    return last;
+    const auto rows = round_.lives[sent.generation].seen();
+    const auto later =
+        std::ranges::find_if(rows, [&](const JournalRow& row) { return row.at >= seen_at; });
+    return later - rows.begin() - 1;
   }
 
   /// From when it takes control until it lets go or dies, nobody else's batch is taken.
@@ -387,8 +373,7 @@ class Judge {
                     std::int64_t until) {
     for (const Slot& slot : round_.slots) {
       if (&slot == &holder) continue;
-      for (std::uint32_t i = 0; i < slot.batches; ++i) {
-        const SentBatch& batch = slot.sent_batches[i];
+      for (const SentBatch& batch : slot.sent()) {
         if (batch.generation != generation || batch.commands == 0 || batch.taken <= from ||
             batch.taken > until)
           continue;
@@ -413,14 +398,15 @@ class Judge {
 
   /// Whatever quintics overshoot, no desired state does.
   void judge_limits(const Generation& life) {
-    const std::int64_t rows = std::min<std::int64_t>(life.rows, kMaxRows);
-    for (std::int64_t k = 0; k < rows; ++k)
-      for (const double desired : life.journal[static_cast<std::size_t>(k)].desired)
+    for (std::int64_t k = -1; const JournalRow& row : life.seen()) {
+      ++k;
+      for (const double desired : row.desired)
         if (!(desired >= kLowest && desired <= kHighest))
           return failures_.push_back(
               {Fault::wrong_row, "row " + std::to_string(k) + " of generation " +
                                      std::to_string(&life - round_.lives.data()) + " desires " +
                                      std::to_string(desired) + ", outside of the limits"});
+    }
   }
 
   /// No iteration was granted twice.

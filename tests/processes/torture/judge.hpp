@@ -29,10 +29,8 @@ struct HaltCount {
   std::uint64_t bursts = 0;       // ended by them
   std::uint64_t commands = 0;     // the same
   std::uint64_t resumed = 0;
-
-  HaltCount& operator+=(const HaltCount& more);
 };
-HaltCount halts_of(const Round& round);
+void count_halts(const Round& round, HaltCount& count);
 
 /// Commands that were compared.
 std::uint64_t commands_of(const Round& round);

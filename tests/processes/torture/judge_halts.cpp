@@ -202,15 +202,13 @@ class HaltedLife {
       begun[i - 1].second = std::min(begun[i - 1].second, begun[i].second);
     const bool ever = first_halted(1) >= 0 || resumes_ > 0 || rows_ < 2;
     for (const Slot& slot : round_.slots)
-      for (std::uint32_t i = 0; i < slot.batches; ++i) {
-        const SentBatch& batch = slot.sent_batches[i];
+      for (const SentBatch& batch : slot.sent()) {
         if (batch.generation != number_) continue;
         const auto halt = std::upper_bound(begun.begin(), begun.end(),
                                            std::pair(batch.sent_at, std::int64_t{1} << 62));
         const bool before = batch.sent_at > 0 && halt != begun.end();
-        for (std::uint32_t k = 0; k < batch.commands; ++k)
-          judge(slot, batch, slot.sent_commands[batch.first_command + k],
-                before ? halt->second : std::int64_t{1} << 62, ever);
+        for (const SentCommand& command : slot.sent_in(batch))
+          judge(slot, batch, command, before ? halt->second : std::int64_t{1} << 62, ever);
       }
   }
   void judge(const Slot& slot, const SentBatch& batch, const SentCommand& command,
@@ -284,21 +282,7 @@ void judge_halts(const Round& round, std::vector<Failure>& failures) {
   });
 }
 
-HaltCount& HaltCount::operator+=(const HaltCount& more) {
-  requested += more.requested;
-  interrupted += more.interrupted;
-  controlled += more.controlled;
-  begun += more.begun;
-  moving += more.moving;
-  inherited += more.inherited;
-  bursts += more.bursts;
-  commands += more.commands;
-  resumed += more.resumed;
-  return *this;
-}
-
-HaltCount halts_of(const Round& round) {
-  HaltCount count;
+void count_halts(const Round& round, HaltCount& count) {
   for (const Slot& slot : round.slots) {
     for (std::uint32_t i = 0; i < slot.halts; ++i) {
       const std::uint32_t requested = slot.requested_halts[i].requested;
@@ -326,7 +310,6 @@ HaltCount halts_of(const Round& round) {
     }
   }
   for_each_successor(round, [&](const Generation&, const Generation&) { ++count.inherited; });
-  return count;
 }
 
 }  // namespace torture

@@ -51,31 +51,11 @@ constexpr Label kBackend[] = {{"create.before_lock", 1},
                               {"halt.before_reason", 4},
                               {"halt.before_number", 4}};
 
-constexpr Label kBursting[] = {{"burst.before", 30},
-                               {"burst.before_row", 30},
-                               {"burst.before_id", 30},
-                               {"burst.before_newest", 30},
-                               {"burst.after", 30},
-                               {"bell.before_sleep", 20},
-                               {"bell.after_sleep", 20},
-                               {"history.before_row", 100},
-                               {"history.after_published", 100},
-                               {"status.after_word", 60},
-                               {"status.before_word", 60},
-                               {"events.before", 30},
-                               {"events.after", 30},
-                               {"lane.before_freed", 30},
-                               {"create.before_rename", 1},
-                               {"create.after_rename", 1},
-                               {"segment.after_state", 1},
-                               {"backend.after_take", 30},
-                               {"staged.after", 20},
-                               {"create.after_draft", 1},
-                               {"create.after_former", 1},
-                               {"sweep.after_draft", 1},
-                               {"segment.between_unlinks", 1},
-                               {"halt.before_reason", 4},
-                               {"halt.before_number", 4}};
+/// Beside those of every backend.
+constexpr Label kBursting[] = {{"burst.before", 30},    {"burst.before_row", 30},
+                               {"burst.before_id", 30}, {"burst.before_newest", 30},
+                               {"burst.after", 30},     {"bell.before_sleep", 20},
+                               {"bell.after_sleep", 20}};
 
 constexpr Label kSender[] = {
     {"lane.after_lock", 1},        {"lane.before_dead", 1},   {"lane.before_incarnation", 1},

@@ -12,7 +12,7 @@ struct Label {
   std::uint32_t passages;
 };
 
-/// The crash points that actors of a role pass.
+/// The crash points that actors of a role pass; bursting backends pass those of backends too.
 std::span<const Label> labels_of(Role role);
 
 }  // namespace torture

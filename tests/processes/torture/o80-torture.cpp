@@ -1,7 +1,6 @@
 // Kills and stops the processes around o80's segments at random and at labelled points, and judges
 // whether the promises hold: nothing hangs, nothing tears, nothing is lost.
 
-#include <getopt.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <sys/prctl.h>
@@ -13,21 +12,25 @@
 #include <cstdlib>
 #include <filesystem>
 #include <list>
+#include <map>
 #include <optional>
 #include <random>
+#include <string_view>
 
 #include "torture/arena.hpp"
 
 namespace torture {
 namespace {
 
+constexpr std::uint64_t kEveryRound = ~0ULL;
+
 struct Options {
   std::uint64_t kills = 2000;
   std::uint64_t halts = 0;
   std::uint64_t seed = 0;
-  std::int64_t round = -1;   // only this one, again and again
-  std::int64_t seconds = 0;  // 0: until there are enough kills
-  std::uint32_t arenas = 3;
+  std::uint64_t round = kEveryRound;  // only this one, again and again
+  std::uint64_t seconds = 0;          // 0: until there are enough kills
+  std::uint64_t arenas = 3;
   std::string python{};  // interpreter that has o80; empty: no actors in Python
 };
 
@@ -38,7 +41,7 @@ class Campaign {
  public:
   Campaign(const Options& options, const std::string& directory) : options_(options) {
     if (!options.python.empty()) nursery_.emplace(options.python, O80_TORTURE_ACTOR);
-    for (std::uint32_t i = 0; i < options.arenas; ++i)
+    for (std::uint64_t i = 0; i < options.arenas; ++i)
       arenas_.emplace_back(directory + "/" + std::to_string(i), tally_,
                            nursery_ ? &*nursery_ : nullptr);
   }
@@ -82,8 +85,7 @@ class Campaign {
   }
 
   void begin(Arena& arena) {
-    const std::uint64_t round =
-        options_.round >= 0 ? static_cast<std::uint64_t>(options_.round) : rounds_++;
+    const std::uint64_t round = options_.round != kEveryRound ? options_.round : rounds_++;
     arena.begin(mix(options_.seed, round),
                 "round " + std::to_string(round) + ", to be played again with --seed " +
                     std::to_string(options_.seed) + " --round " + std::to_string(round));
@@ -94,7 +96,8 @@ class Campaign {
   }
 
   bool late(std::int64_t now) const {
-    return options_.seconds > 0 && now - began_ > options_.seconds * 1000 * kMillisecond;
+    const auto limit = static_cast<std::int64_t>(options_.seconds) * 1000 * kMillisecond;
+    return limit > 0 && now - began_ > limit;
   }
 
   std::uint64_t failures() const {
@@ -108,7 +111,7 @@ class Campaign {
     while (waitpid(-1, nullptr, WNOHANG) >= 0) {
       if (o80::monotonic_now() > end) {
         ++tally_.failures[Fault::left_over];
-        std::printf("FAILED (%s): a process does not end\n", name_of(Fault::left_over));
+        std::printf("FAILED (%s): a process does not end\n", name_of(Fault::left_over).c_str());
         return;
       }
       usleep(1000);
@@ -129,7 +132,7 @@ class Campaign {
     const auto number = [](std::uint64_t n) { return static_cast<unsigned long>(n); };
     std::printf("\nkilled, by actor\n");
     for (const auto& [role, n] : tally_.kills_by_role)
-      std::printf("  %-28s %6lu\n", name_of(role), number(n));
+      std::printf("  %-28s %6lu\n", name_of(role).c_str(), number(n));
     std::printf("killed, by crash point\n");
     for (const auto& [label, n] : tally_.kills_by_label)
       std::printf("  %-28s %6lu\n", label.c_str(), number(n));
@@ -159,14 +162,14 @@ class Campaign {
     print_times("kill => first row of the next one is seen", tally_.recovered);
     for (std::uint32_t i = 1; i < static_cast<std::uint32_t>(Fault::count); ++i) {
       const auto fault = static_cast<Fault>(i);
-      std::printf("%-44s %6lu\n", name_of(fault), number(tally_.failures[fault]));
+      std::printf("%-44s %6lu\n", name_of(fault).c_str(), number(tally_.failures[fault]));
     }
     if (interrupted != 0) std::printf("interrupted\n");
     const bool late_and_short = !is_done() && failures() == 0 && interrupted == 0;
     if (late_and_short)
-      std::printf("only %lu of %lu kills and %lu of %lu halts in %ld s\n", number(tally_.kills),
+      std::printf("only %lu of %lu kills and %lu of %lu halts in %lu s\n", number(tally_.kills),
                   number(options_.kills), number(halts.requested), number(options_.halts),
-                  static_cast<long>(options_.seconds));
+                  number(options_.seconds));
     std::printf("seed %lu, %.0f s\n%lu kills, %lu halts, %lu failures\n", number(options_.seed),
                 static_cast<double>(o80::monotonic_now() - began_) / 1e9, number(tally_.kills),
                 number(halts.requested), number(failures()));
@@ -184,42 +187,21 @@ class Campaign {
 Options parse(int argc, char** argv) {
   Options options;
   options.seed = std::random_device()() % 1'000'000;
-  static const option kLong[] = {{"kills", required_argument, nullptr, 'k'},
-                                 {"halts", required_argument, nullptr, 'h'},
-                                 {"seed", required_argument, nullptr, 's'},
-                                 {"round", required_argument, nullptr, 'r'},
-                                 {"seconds-limit", required_argument, nullptr, 't'},
-                                 {"arenas", required_argument, nullptr, 'a'},
-                                 {"python", required_argument, nullptr, 'p'},
-                                 {nullptr, 0, nullptr, 0}};
-  for (int c = 0; (c = getopt_long(argc, argv, "", kLong, nullptr)) != -1;) {
-    switch (c) {
-      case 'k':
-        options.kills = std::strtoull(optarg, nullptr, 10);
-        break;
-      case 'h':
-        options.halts = std::strtoull(optarg, nullptr, 10);
-        break;
-      case 's':
-        options.seed = std::strtoull(optarg, nullptr, 10);
-        break;
-      case 'r':
-        options.round = std::strtol(optarg, nullptr, 10);
-        break;
-      case 't':
-        options.seconds = std::strtol(optarg, nullptr, 10);
-        break;
-      case 'a':
-        options.arenas = static_cast<std::uint32_t>(std::strtol(optarg, nullptr, 10));
-        break;
-      case 'p':
-        options.python = optarg;
-        break;
-      default:
-        std::printf(
-            "o80-torture [--kills 2000] [--halts 0] [--seed S] [--round R] [--seconds-limit S] "
-            "[--arenas 3] [--python INTERPRETER]\n");
-        std::exit(2);
+  const std::map<std::string_view, std::uint64_t*> numbers{
+      {"--kills", &options.kills},   {"--halts", &options.halts},
+      {"--seed", &options.seed},     {"--round", &options.round},
+      {"--arenas", &options.arenas}, {"--seconds-limit", &options.seconds}};
+  for (int i = 1; i < argc; i += 2) {
+    const auto number = numbers.find(argv[i]);
+    if (i + 1 < argc && number != numbers.end()) {
+      *number->second = std::strtoull(argv[i + 1], nullptr, 10);
+    } else if (i + 1 < argc && std::string_view(argv[i]) == "--python") {
+      options.python = argv[i + 1];
+    } else {
+      std::printf(
+          "o80-torture [--kills 2000] [--halts 0] [--seed S] [--round R] [--seconds-limit S] "
+          "[--arenas 3] [--python INTERPRETER]\n");
+      std::exit(2);
     }
   }
   return options;

@@ -226,11 +226,6 @@ bool Sender::send(std::int64_t at, bool late_now, std::int64_t burst, bool until
   entry.sent = static_cast<std::uint32_t>(Sent::under_way);
   actor_.slot.batches = place + 1;
   first_ = actor_.slot.commands;
-  const auto refused = [&] {
-    entry.sent = static_cast<std::uint32_t>(Sent::refused);
-    frontend_.forget_added();
-    return false;
-  };
   try {
     const o80::Batch batch = send();
     entry.id = batch.id();
@@ -239,13 +234,11 @@ bool Sender::send(std::int64_t at, bool late_now, std::int64_t burst, bool until
     entry.sent = static_cast<std::uint32_t>(Sent::sent);
     entry.sent_at = o80::monotonic_now();
     open_.push_back({batch, &entry});
-  } catch (const o80::LaneFull&) {
-    return refused();
-  } catch (const o80::NoLane&) {
-    return refused();
-  } catch (const o80::BackendGone&) {
-    refused();
-    throw;
+  } catch (const o80::Error& error) {
+    entry.sent = static_cast<std::uint32_t>(Sent::refused);
+    frontend_.forget_added();
+    if (!is_refusal(error)) throw;
+    return false;
   }
   watch_lane();
   return true;

@@ -62,4 +62,13 @@ class Bytes {
   std::span<const std::byte> left_;
 };
 
+/// What a fuzzer does with an input.
+void run(Bytes bytes);
+
 }  // namespace o80::fuzz
+
+extern "C" [[gnu::used]] inline int LLVMFuzzerTestOneInput(const std::uint8_t* data,
+                                                           std::size_t size) {
+  o80::fuzz::run({data, size});
+  return 0;
+}

@@ -104,6 +104,8 @@ std::shared_ptr<const Description> description_of_robot() {
   return description;
 }
 
+}  // namespace
+
 void run(Bytes bytes) {
   static const std::shared_ptr<const Description> description = description_of_robot();
   const Schema& schema = description->schema;
@@ -138,10 +140,4 @@ void run(Bytes bytes) {
   decode(description, rest);
 }
 
-}  // namespace
 }  // namespace o80::fuzz
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  o80::fuzz::run({data, size});
-  return 0;
-}

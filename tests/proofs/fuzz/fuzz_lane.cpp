@@ -1,21 +1,18 @@
 // A frontend that lies: garbage in its lane and on the bell's page while the backend iterates.
 // The loop goes on, no desired state leaves its limits, and another frontend is served.
 
-#include <stdlib.h>
-#include <unistd.h>
-
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "control/sending/batch_builder.hpp"
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"
 #include "memory/os/atomic_words.hpp"
+#include "memory/private_directory.hpp"
 #include "memory/ring/lane_sender.hpp"
 #include "memory/segment/liveness.hpp"
 #include "o80/base/error.hpp"
@@ -34,29 +31,6 @@ constexpr std::uint64_t kAnyLine = 64 * kBlocks / 8;  // words of the transport
 void must(bool holds) {
   if (!holds) std::abort();
 }
-
-/// A directory of segments, which goes with the process.
-class Directory {
- public:
-  Directory() {
-    char path[] = "/dev/shm/o80-fuzz-XXXXXX";
-    must(mkdtemp(path) != nullptr);
-    path_ = path;
-    setenv("O80_DIRECTORY", path, 1);
-    // a backend of its own keeps the helper thread of this process from coming and going
-    idle_.emplace(schema_of_robot(),
-                  BackendOptions{.segment = "idle", .history = 1, .lanes = 1, .lane_blocks = 1});
-  }
-  Directory& operator=(Directory&&) = delete;
-  ~Directory() {
-    idle_.reset();
-    rmdir(path_.c_str());
-  }
-
- private:
-  std::string path_;
-  std::optional<UntypedBackend> idle_;
-};
 
 /// The robot, watched: every desired state is one it can bear.
 class Plant final : private RequestServer {
@@ -355,8 +329,13 @@ class HonestFrontend {
   UntypedFrontend frontend_;
 };
 
+}  // namespace
+
 void run(Bytes bytes) {
-  static const Directory directory;
+  static const PrivateDirectory directory;
+  // a backend of its own keeps the helper thread of this process from coming and going
+  static const UntypedBackend idle(schema_of_robot(),
+                                   {.segment = "idle", .history = 1, .lanes = 1, .lane_blocks = 1});
   const auto kind = bytes.number<std::uint8_t>();
   Plant plant((kind & 1) != 0, (kind & 2) != 0 ? Stale::purge : Stale::hold);
   HostileFrontend hostile;
@@ -387,10 +366,4 @@ void run(Bytes bytes) {
   honest.is_served_by(plant);
 }
 
-}  // namespace
 }  // namespace o80::fuzz
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  o80::fuzz::run({data, size});
-  return 0;
-}

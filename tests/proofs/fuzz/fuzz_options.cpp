@@ -24,8 +24,6 @@ struct Config {
 O80_DESCRIBE(Config, address, (gain, "of the loop [Nm/rad]"), count, small, fast, gear, offsets,
              like);
 
-namespace {
-
 void run(Bytes bytes) {
   static const std::vector<Option> options = options_of<Config>();
   const auto known = bytes.number<std::uint8_t>();
@@ -63,10 +61,4 @@ void run(Bytes bytes) {
   }
 }
 
-}  // namespace
 }  // namespace o80::fuzz
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  o80::fuzz::run({data, size});
-  return 0;
-}

@@ -105,6 +105,8 @@ Schema edited(Bytes& bytes) {
   return schema;
 }
 
+}  // namespace
+
 void run(Bytes bytes) {
   try {
     switch (bytes.number<std::uint8_t>() % 3) {
@@ -125,10 +127,4 @@ void run(Bytes bytes) {
   }
 }
 
-}  // namespace
 }  // namespace o80::fuzz
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  o80::fuzz::run({data, size});
-  return 0;
-}

@@ -2,20 +2,19 @@
 // stretched. Whoever attaches to it works or is told what is wrong, and goes on.
 
 #include <fcntl.h>
-#include <stdlib.h>
-#include <unistd.h>
 
 #include <array>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <vector>
 
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"
+#include "memory/file_bytes.hpp"
+#include "memory/private_directory.hpp"
 #include "memory/segment/owned_segment.hpp"
 #include "memory/segment/segment_file.hpp"
 #include "memory/segment/segment_name.hpp"
@@ -44,10 +43,6 @@ struct Part {
 class Original {
  public:
   Original() {
-    char path[] = "/dev/shm/o80-fuzz-XXXXXX";
-    if (mkdtemp(path) == nullptr) std::abort();
-    directory_ = path;
-    setenv("O80_DIRECTORY", path, 1);
     UntypedBackend backend(schema_of_robot(),
                            {.segment = "robot", .history = 4, .lanes = 2, .lane_blocks = 16});
     backend.publish();
@@ -61,12 +56,9 @@ class Original {
       if (backend.try_step() == Step::run) backend.publish();
     }
     for (std::size_t i = 0; i < files_.size(); ++i) {
-      std::ifstream file(paths_[i], std::ios::binary);
-      files_[i].assign(std::istreambuf_iterator<char>(file), {});
+      files_[i] = o80::read_all(paths_[i]);
     }
   }
-  Original& operator=(Original&&) = delete;
-  ~Original() { std::filesystem::remove_all(directory_); }
 
   const std::string& path(std::size_t file) const { return paths_[file]; }
   const Files& files() const { return files_; }
@@ -88,7 +80,7 @@ class Original {
   }
 
  private:
-  std::string directory_;
+  PrivateDirectory directory_;
   SegmentOffsets offsets_{};
   std::array<std::string, 2> paths_;
   Files files_;
@@ -188,14 +180,14 @@ void attach(const FrontendOptions& options) {
   may_refuse([&] { Frontend<Robot>("robot", options).latest(); });
 }
 
+}  // namespace
+
 void run(Bytes bytes) {
   static const Original original;
   const bool alive = bytes.number<std::uint8_t>() % 2 == 0;
   const Files files = lie(original, bytes);
   for (std::size_t i = 0; i < files.size(); ++i) {
-    std::ofstream out(original.path(i), std::ios::binary | std::ios::trunc);
-    out.write(files[i].data(), static_cast<std::streamsize>(files[i].size()));
-    if (!out) std::abort();
+    write_all(original.path(i), files[i]);
   }
   list_segments();
   if (alive) {
@@ -216,10 +208,4 @@ void run(Bytes bytes) {
   if (std::filesystem::exists(original.path(1))) std::abort();
 }
 
-}  // namespace
 }  // namespace o80::fuzz
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  o80::fuzz::run({data, size});
-  return 0;
-}

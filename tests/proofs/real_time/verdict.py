@@ -90,7 +90,7 @@ def percentile(histogram: dict[int, int], share: float) -> int:
 
 
 def jitter(findings: Findings) -> Iterator[str]:
-    """Lateness of the loop beside that of cyclictest, as percentiles and as a histogram."""
+    """Lateness of the loop beside that of cyclictest."""
     both = (findings.lateness_of_loop(), findings.lateness_of_cyclictest())
     if not all(both):
         return
@@ -99,14 +99,6 @@ def jitter(findings: Findings) -> Iterator[str]:
         loop, bare = (percentile(each, share) for each in both)
         yield f"{name:>16} {loop:9} {bare:11}"
     yield f"{'longest':>16} {max(both[0]):9} {max(both[1]):11}"
-    edges = [0, 50, 100, 200, 500, 1000, 2000, 5000, 10000]
-    for low, high in zip(edges, [*edges[1:], None], strict=True):
-        loop, bare = (
-            sum(n for late, n in each.items() if late >= low and (high is None or late < high))
-            for each in both
-        )
-        span = f"{low} to {high}" if high is not None else f"{low} and more"
-        yield f"{span:>16} {loop:9} {bare:11}"
 
 
 def report(findings: Findings) -> Iterator[str]:

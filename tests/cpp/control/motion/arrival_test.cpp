@@ -17,15 +17,11 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
-Schema limited_robot(std::int64_t frequency, const Limits& limits, std::uint32_t numbers = 1) {
+Schema robot_at(std::int64_t frequency, const Limits& limits, std::uint32_t numbers = 1) {
   Schema schema = plain_robot(1, numbers);
   schema.head.period = 1'000'000'000 / frequency;
-  if (numbers == 1) {
-    schema.actuator(0).limits(limits);
-  } else {
-    for (std::uint32_t i = 0; i < numbers; ++i) {
-      schema.actuator(0).limits("x" + std::to_string(i), limits);
-    }
+  for (std::uint32_t i = 0; i < numbers; ++i) {
+    schema.actuator(0).limits(numbers == 1 ? "" : "x" + std::to_string(i), limits);
   }
   return schema;
 }
@@ -103,7 +99,7 @@ TEST(Arrival, CommandsRestAtTheirTargets) {
   for (const Requested& requested : all) {
     SCOPED_TRACE(testing::Message() << to_text(requested.head.pace) << " to " << requested.target
                                     << " at " << requested.frequency << " Hz");
-    Rig rig(limited_robot(requested.frequency, requested.limits));
+    Rig rig(robot_at(requested.frequency, requested.limits));
     Rows rows(rates_of(rig.schema));
     rig.add(0, requested.head, {requested.target});
     const CommandId command = rig.pulse() + 2;
@@ -125,7 +121,7 @@ TEST(Arrival, CommandsRestAtTheirTargets) {
 
 // rule C9
 TEST(Arrival, LaterThanAskedSaysWhy) {
-  Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
+  Rig rig(robot_at(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
   rig.add(0, smoothly(over(50)), {0.1});
   rig.add(0, smoothly(over(99)), {0.0});
   rig.add(0, during(200 * kMillisecond), {0.1});
@@ -143,7 +139,7 @@ TEST(Arrival, LaterThanAskedSaysWhy) {
 
 // rule C10
 TEST(Arrival, AnUntilThatCannotBeKeptComesLaterAndTheNextCommandAfterIt) {
-  Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
+  Rig rig(robot_at(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
   rig.add(0, until(50), {0.1});
   rig.add(0, over(150), {0.2});
   const CommandId batch = rig.pulse();
@@ -155,7 +151,7 @@ TEST(Arrival, AnUntilThatCannotBeKeptComesLaterAndTheNextCommandAfterIt) {
 
 // rule C11
 TEST(Arrival, TargetsOutOfReachAreRejectedWhenTheyWouldBegin) {
-  Rig rig(limited_robot(1000, {.speed = 1.0, .acceleration = 1.0, .jerk = 1.0}, 2));
+  Rig rig(robot_at(1000, {.speed = 1.0, .acceleration = 1.0, .jerk = 1.0}, 2));
   rig.add(0, smoothly(over(10)), {1e300, 0.0});
   rig.add(0, at_speed(1.0), {0.0, -1e17});
   rig.add(0, over(10), {0.0, 0.0});
@@ -173,7 +169,7 @@ TEST(Arrival, TargetsOutOfReachAreRejectedWhenTheyWouldBegin) {
 
 // rule C15
 TEST(Arrival, ASetPointGivesWayToTheNextAndTheLastArrives) {
-  Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
+  Rig rig(robot_at(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
   for (const double target : {0.1, 0.2, 0.3}) rig.add(0, direct(), {target});
   const CommandId batch = rig.pulse();
   rig.run(3);
@@ -188,7 +184,7 @@ TEST(Arrival, ASetPointGivesWayToTheNextAndTheLastArrives) {
 
 // rule C15
 TEST(Arrival, ASetPointArrivesBeforeACommandThatHasAPace) {
-  Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
+  Rig rig(robot_at(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
   rig.add(0, direct(), {0.1});
   rig.add(0, over(200), {0.0});
   const CommandId batch = rig.pulse();
@@ -203,7 +199,7 @@ TEST(Arrival, ASetPointArrivesBeforeACommandThatHasAPace) {
 TEST(Arrival, ASetPointThatIsRepeatedForEverArrives) {
   for (const bool overwrites : {false, true}) {
     for (const std::int64_t every : {0, 20}) {
-      Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
+      Rig rig(robot_at(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
       RecordHead head = smoothly(paced(Pace::direct, every * kMillisecond));
       if (overwrites) head = overwriting(head);
       for (int i = 0; i < 200; ++i) {
@@ -217,7 +213,7 @@ TEST(Arrival, ASetPointThatIsRepeatedForEverArrives) {
 }
 
 TEST(Arrival, VelocitiesAreReachedAndHeld) {
-  Schema schema = limited_robot(250, {.speed = 5.0, .acceleration = 100.0});
+  Schema schema = robot_at(250, {.speed = 5.0, .acceleration = 100.0});
   schema.actuator(0).rests_at("", 0.0);
   Rig rig(schema);
   double way = 0.0;
@@ -239,7 +235,7 @@ TEST(Arrival, VelocitiesAreReachedAndHeld) {
 
 /// A learner that queues targets for each step of a simulation is never further behind.
 TEST(Arrival, ThousandsOfQueuedRowsOfSetPointsDoNotLagMoreAndMore) {
-  Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
+  Rig rig(robot_at(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
   std::vector<double> rows;
   for (int burst = 0; burst < 10'000; ++burst) {
     const double target = 0.2 * std::sin(0.05 * burst);
@@ -264,7 +260,7 @@ TEST(Arrival, AHaltBesideABoundStaysInsideWithinTheLimits) {
     for (const std::int64_t n : {60, 130, 250}) {
       const Limits limits{.maximum = 0.1, .speed = 2.0, .acceleration = 15.0, .jerk = jerk};
       for (int halted = 1; halted < n; ++halted) {
-        Rig rig(limited_robot(500, limits));
+        Rig rig(robot_at(500, limits));
         Rows rows(rates_of(rig.schema));
         rig.add(0, smoothly(over(n)), {0.1});
         const CommandId command = rig.pulse() + 2;
@@ -289,7 +285,7 @@ TEST(Arrival, AHaltBesideABoundStaysInsideWithinTheLimits) {
 
 // rule C17
 TEST(Arrival, TargetsAsSentAreShownAsTheyAre) {
-  Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
+  Rig rig(robot_at(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
   RecordHead head = paced(Pace::direct, 0);
   head.profile = Profile::as_sent;
   // within the limits: half a second of a smooth motion
@@ -331,7 +327,7 @@ struct Stream {
 /// Plays a stream for four seconds; returns the lag behind it [ms].
 double play(const Stream& stream, std::uint64_t seed) {
   Dice dice(seed);
-  Rig rig(limited_robot(stream.frequency, stream.limits));
+  Rig rig(robot_at(stream.frequency, stream.limits));
   Rows rows(rates_of(rig.schema));
   const std::int64_t every = stream.frequency / stream.rate;
   // as fast as 85 % of the limits of speed and acceleration

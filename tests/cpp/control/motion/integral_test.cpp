@@ -18,12 +18,9 @@ constexpr std::int64_t kVelocityPeriod = 4'000'000;  // [ns]
 
 /// A joint with an observed position and a commanded velocity, bounded at -1 and 1.
 Schema velocity_robot(const Limits& velocity, double reaction, double minimum = -1.0) {
-  Schema schema;
-  schema.head.robot = NameText("robot");
+  Schema schema =
+      robot_of({scalar_field("position", Kind::float64), scalar_field("velocity", Kind::float64)});
   schema.head.period = kVelocityPeriod;
-  const auto type = schema.add_type(
-      "State", {scalar_field("position", Kind::float64), scalar_field("velocity", Kind::float64)});
-  schema.add_actuators("joint", type, 1);
   Limits limits = velocity;
   limits.integral = {"position", minimum, 1.0, reaction};
   schema.actuator(0).limits("velocity", limits).rests_at("velocity", 0.0);

@@ -12,9 +12,7 @@ namespace {
 
 // rule L4
 TEST(Limiter, ATrajectoryGoesOnUntilItsLastRowIsReached) {
-  Schema schema = plain_robot(1);
-  schema.actuator(0).limits({.speed = 1000.0, .acceleration = 10'000.0, .jerk = 1e6});
-  Rig rig(schema);
+  Rig rig(limited_robot({.speed = 1000.0, .acceleration = 10'000.0, .jerk = 1e6}));
   rig.add_rows(0, over(5), 3, {5.0, -5.0, 10.0});
   const CommandId batch = rig.pulse();
   double furthest = 0.0;
@@ -106,9 +104,7 @@ TEST(Limiter, ASpeedPaceAtTheMaximumIsNotClampedByRounding) {
   for (const double speed : {0.1, 0.3, 1.0 / 3.0, 0.7, 12.34567}) {
     for (const bool smooth : {false, true}) {
       constexpr double kFar = 1e6 / 7.0;  // where a number is rounded more than its steps are
-      Schema schema = plain_robot(1);
-      schema.actuator(0).limits({.speed = speed});
-      Rig rig(schema);
+      Rig rig(limited_robot({.speed = speed}));
       rig.observe(0, kFar);
       rig.controller.restart(rig.observed.data(), nullptr, 0);
       const RecordHead head = at_speed(speed);

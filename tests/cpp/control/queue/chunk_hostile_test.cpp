@@ -15,20 +15,10 @@ namespace {
 
 TEST(ChunkHostile, WhatCannotBeIsInvalidAndNothingIsLost) {
   const auto in_chunk = [](auto change) {
-    return [change](std::vector<Block>& blocks) {
-      ChunkHead chunk;
-      std::memcpy(&chunk, blocks[2].bytes.data(), sizeof chunk);
-      change(chunk);
-      std::memcpy(blocks[2].bytes.data(), &chunk, sizeof chunk);
-    };
+    return [change](std::vector<Block>& blocks) { edit<ChunkHead>(blocks[2], change); };
   };
   const auto in_member = [](auto change) {
-    return [change](std::vector<Block>& blocks) {
-      RecordHead head;
-      std::memcpy(&head, blocks[3].bytes.data(), sizeof head);
-      change(head);
-      std::memcpy(blocks[3].bytes.data(), &head, sizeof head);
-    };
+    return [change](std::vector<Block>& blocks) { edit<RecordHead>(blocks[3], change); };
   };
   const auto in_note = [](std::size_t i, std::uint32_t due) {
     return [=](std::vector<Block>& blocks) {  // head, lists, list, note
@@ -64,15 +54,8 @@ TEST(ChunkHostile, WhatCannotBeIsInvalidAndNothingIsLost) {
   for (std::size_t i = 0; i < changes.size(); ++i) {
     ChunkRig rig;
     rig.run_to(10);
-    const auto bytes = bytes_of(kRows);
-    RecordHead head;
-    const std::vector<BatchBuilder::Member> members{{head, {}, bytes}};
-    const std::vector<const StateLayout*> layouts{&rig.layout};
-    rig.batch.chunk(members, {.anchor = 9, .ease = 10}, every(10, 5), layouts);
-    BatchRecord record;
-    record.id = 1;
-    const auto sealed = rig.batch.seal(record);
-    std::vector<Block> blocks(sealed.begin(), sealed.end());
+    rig.add_chunk(kRows, every(10, 5), {.anchor = 9, .ease = 10}, Profile::smooth);
+    std::vector<Block> blocks = rig.sealed();
     ASSERT_EQ(blocks.size(), 8U);
     changes[i](blocks);
     const BlockIndex first = rig.place(blocks);

@@ -70,9 +70,7 @@ TEST(ChunkLimits, ASampledMotionWithinTheLimitsIsNotClamped) {
 }
 
 TEST(ChunkLimits, RowsWithinBoundsWithATakeOverOutsideAreClampedAndReached) {
-  Schema schema = plain_robot(1);
-  schema.actuator(0).limits({.minimum = 0.0, .maximum = 0.505});
-  ChunkRig rig(std::move(schema));
+  ChunkRig rig(limited_robot({.minimum = 0.0, .maximum = 0.505}));
   rig.reach(101, 0.5, 0.0009);
   rig.add(0, overwriting(over(3)), {0.505});
   rig.pulse();

@@ -207,31 +207,9 @@ TEST(Chunk, APurgeAHaltAnOverwriteAndAFreshStartEndOneThatWaits) {
   }
 }
 
-TEST(Chunk, OfSeveralActuatorsOneThatIsOverwrittenLeavesTheOthers) {
-  ChunkRig rig(plain_robot(3));
-  rig.run_to(101);
-  const CommandId id =
-      rig.chunk(kRows, every(10, 5), {.anchor = 100, .ease = 10}, Profile::monotone, {0, 1, 2});
-  rig.run_to(125);
-  rig.add(1, overwriting(over(2)), {7.0});
-  rig.pulse();
-  rig.run_to(155);
-  EXPECT_EQ(rig.desired(0), 0.2);
-  EXPECT_EQ(rig.desired(1), 7.0);
-  EXPECT_EQ(rig.desired(2), 0.2);
-  EXPECT_EQ(rig.witness.last(id).status, Status::overwritten);
-  EXPECT_EQ(rig.witness.last(id).iteration, 150) << "told when the last one ends";
-  EXPECT_TRUE(rig.all_blocks_back());
-}
-
 TEST(Chunk, NumbersThatCannotBeInterpolatedAreHeldFromTheFirstIteration) {
-  Schema schema;
-  schema.head.robot = NameText("robot");
-  schema.head.period = kMillisecond;
-  const auto type = schema.add_type(
-      "Hand", {scalar_field("place", Kind::float64), scalar_field("open", Kind::boolean)});
-  schema.add_actuators("hand", type, 1);
-  ChunkRig rig(std::move(schema));
+  ChunkRig rig(
+      robot_of({scalar_field("place", Kind::float64), scalar_field("open", Kind::boolean)}));
   struct Hand {
     double place;
     bool open;
@@ -256,25 +234,34 @@ TEST(Chunk, NumbersThatCannotBeInterpolatedAreHeldFromTheFirstIteration) {
   EXPECT_DOUBLE_EQ(rig.desired(), 1.9);
 }
 
-TEST(Chunk, APurgeThatOvertakesItEndsTheActuatorsThatItIsFor) {
-  ChunkRig rig(plain_robot(3));
-  rig.run_to(101);
-  rig.add_chunk(kRows, every(10, 5), {.anchor = 100, .ease = 10}, Profile::monotone, {0, 1, 2});
-  const BlockIndex chunk = rig.send();
-  const CommandId id = record_id(rig.sent, 0);
-  rig.pool.batch(chunk).ticket = 10;
-  rig.batch.purge(1);
-  const BlockIndex purge = rig.send(1);
-  rig.pool.batch(purge).ticket = 11;
-  rig.controller.take(1, purge, rig);
-  rig.controller.take(0, chunk, rig);
-  rig.run_to(155);
-  EXPECT_EQ(rig.desired(0), 0.2);
-  EXPECT_EQ(rig.desired(1), 0.0);
-  EXPECT_EQ(rig.desired(2), 0.2);
-  EXPECT_EQ(rig.witness.last(id).status, Status::purged);
-  EXPECT_EQ(rig.witness.last(id).iteration, 150);
-  EXPECT_TRUE(rig.all_blocks_back());
+TEST(Chunk, OfSeveralActuatorsOneThatIsTakenAwayLeavesTheOthers) {
+  for (const Status status : {Status::overwritten, Status::purged}) {
+    ChunkRig rig(plain_robot(3));
+    rig.run_to(101);
+    rig.add_chunk(kRows, every(10, 5), {.anchor = 100, .ease = 10}, Profile::monotone, {0, 1, 2});
+    const BlockIndex chunk = rig.send();
+    const CommandId id = record_id(rig.sent, 0);
+    rig.pool.batch(chunk).ticket = 10;
+    if (status == Status::purged) {
+      rig.batch.purge(1);  // sent after it, and taken before
+      const BlockIndex purge = rig.send(1);
+      rig.pool.batch(purge).ticket = 11;
+      rig.controller.take(1, purge, rig);
+    }
+    rig.controller.take(0, chunk, rig);
+    rig.run_to(125);
+    if (status == Status::overwritten) {
+      rig.add(1, overwriting(over(2)), {7.0});
+      rig.pulse();
+    }
+    rig.run_to(155);
+    EXPECT_EQ(rig.desired(0), 0.2);
+    EXPECT_EQ(rig.desired(1), status == Status::overwritten ? 7.0 : 0.0);
+    EXPECT_EQ(rig.desired(2), 0.2);
+    EXPECT_EQ(rig.witness.last(id).status, status);
+    EXPECT_EQ(rig.witness.last(id).iteration, 150) << "told when the last one ends";
+    EXPECT_TRUE(rig.all_blocks_back());
+  }
 }
 
 TEST(Chunk, ThatBeginsAtOnceNeedsNoPlaceAmongThoseThatWait) {
@@ -313,11 +300,7 @@ TEST(Chunk, AfterTheLastRowThePlanRestsWithLimitsOrWithout) {
 }
 
 TEST(Chunk, HeldRowsOf64BitsAreHeld) {
-  Schema schema;
-  schema.head.robot = NameText("robot");
-  schema.head.period = kMillisecond;
-  schema.add_actuators("wheel", schema.add_type("int64", {scalar_field("", Kind::int64)}), 1);
-  ChunkRig rig(std::move(schema));
+  ChunkRig rig(robot_of({scalar_field("", Kind::int64)}));
   rig.run_to(101);
   const std::vector<std::int64_t> rows{(std::int64_t{1} << 60) + 1, -20, 7};
   std::vector<double> bits(rows.size());
@@ -417,19 +400,15 @@ TEST(Chunk, LongOnesWithStatesOfManyNumbersFindTheirRows) {
   for (const std::uint32_t numbers : {1U, 2U, 5U, 6U, 11U}) {
     for (const std::size_t count : {1U, 7U, 8U, 9U, 128U, 129U, 2048U}) {
       ChunkRig rig(plain_robot(1, numbers), 60'000);
-      const StateLayout layout(rig.schema, rig.schema.actuators[0].type);
       std::vector<double> rows;
       for (std::size_t i = 0; i < count; ++i) {
         for (std::uint32_t k = 0; k < numbers; ++k)
           rows.push_back(static_cast<double>(i * (k + 1)));
       }
-      const auto bytes = bytes_of(rows);
-      const std::vector<BatchBuilder::Member> members{{{}, {}, bytes}};
-      const std::vector<const StateLayout*> layouts{&layout};
       const auto late = static_cast<Iteration>(count / 2);
       rig.run_to(late * 2 + 2);
-      rig.batch.chunk(members, {.anchor = 1, .ease = 1, .fixed = 1}, every(2, count), layouts);
-      const CommandId id = rig.pulse() + 2;
+      const CommandId id =
+          rig.chunk(rows, every(2, count), {.anchor = 1, .ease = 1, .fixed = 1}, Profile::linear);
       for (Iteration row = late; row < static_cast<Iteration>(count); ++row) {
         while (rig.next <= 1 + 2 * (row + 1)) rig.step();
         for (std::uint32_t k = 0; k < numbers; ++k) {

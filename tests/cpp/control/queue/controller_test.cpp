@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "control/rig.hpp"
 #include "o80/base/error.hpp"
 
@@ -84,25 +82,6 @@ TEST(Controller, ABatchMayBeRejectedAfterItWasChecked) {
   rig.controller.finish_pending();
   EXPECT_TRUE(rig.all_blocks_back());
   EXPECT_EQ(rig.witness.changes.size(), 24U);
-}
-
-TEST(Controller, TheRowsOfOneLongTrajectoryAreCheckedBitByBitToo) {
-  for (const double last : {7.0, std::nan("")}) {
-    Rig rig(plain_robot(1, 2), 10'000);
-    std::vector<double> rows(10'000, 1.0);
-    std::vector<std::int64_t> times(5'000, 5);
-    rows.back() = last;
-    rig.add_rows(0, during(0), 5'000, rows, times, {0b10});
-    const BlockIndex batch = rig.send();
-    int calls = 1;
-    while (!rig.check(0, batch, 100)) ++calls;
-    EXPECT_NEAR(calls, 19, 1) << "8 + 16 bytes a row, 6400 bytes a call";
-    rig.controller.take(0, batch, rig);
-    rig.step();
-    EXPECT_EQ(rig.witness.last(rig.sent + 2).reason,
-              std::isnan(last) ? Reason::invalid : Reason::none);
-    EXPECT_EQ(rig.active(), !std::isnan(last));
-  }
 }
 
 // rule B9

@@ -7,18 +7,10 @@ namespace o80::test {
 namespace {
 
 template <class T>
-Schema counter(Kind kind, const Limits& limits) {
-  Schema schema;
-  schema.head.robot = NameText("robot");
-  schema.head.period = kMillisecond;
-  schema.add_actuators("counter", schema.add_type("Counter", {scalar_field("", kind)}), 1);
-  schema.actuator(0).limits(limits);
-  return schema;
-}
-
-template <class T>
 void expect_ten_in_a_second(Kind kind) {
-  Rig rig(counter<T>(kind, {.speed = 10.0}));
+  Schema counter = robot_of({scalar_field("", kind)});
+  counter.actuator(0).limits({.speed = 10.0});
+  Rig rig(std::move(counter));
   RecordHead head = direct();
   rig.batch.command(head, bytes_of_one(T{100}));
   rig.pulse();
@@ -86,7 +78,6 @@ TEST(Pace, ASpeedIsThatOfTheFirstNumberTheCommandNames) {
   }
 }
 
-// rule C7
 TEST(Pace, AMotionThatIsTurnedBackIsNoFasterThanItsSpeed) {
   for (const bool limited : {false, true}) {
     Schema schema = plain_robot(1);

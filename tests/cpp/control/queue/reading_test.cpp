@@ -14,12 +14,6 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::int64_t kTenSeconds = 10'000'000'000;
 
-Schema robot_with(const Limits& limits, WhenIdle when_idle = WhenIdle::hold) {
-  Schema schema = plain_robot(1);
-  schema.actuator(0).limits(limits).when_idle(when_idle);
-  return schema;
-}
-
 void expect_finite(const Rig& rig) { ASSERT_TRUE(std::isfinite(rig.desired())); }
 
 /// 5.0 in 10 s at no more than 1/s: it gets there in the end, and never faster than that.
@@ -43,7 +37,7 @@ void expect_that_limits_hold(Rig& rig) {
 // rule L6
 TEST(Reading, InRowZeroThatIsNoNumberIsNeverDesired) {
   for (const double odd : {kNan, kInfinity, -kInfinity}) {
-    Rig rig(robot_with({.speed = 1.0}));
+    Rig rig(limited_robot({.speed = 1.0}));
     rig.observe(0, odd);
     rig.controller.restart(rig.observed.data(), nullptr, 0);
     expect_finite(rig);
@@ -53,7 +47,7 @@ TEST(Reading, InRowZeroThatIsNoNumberIsNeverDesired) {
 }
 
 TEST(Reading, OutsideTheBoundsIsLeftAtThePaceOfTheCommand) {
-  Rig rig(robot_with({.minimum = -1.0, .maximum = 1.0}));
+  Rig rig(limited_robot({.minimum = -1.0, .maximum = 1.0}));
   rig.observe(0, 1.2);
   rig.controller.restart(rig.observed.data(), nullptr, 0);
   rig.add(0, during(kTenSeconds), {0.5});
@@ -72,7 +66,7 @@ TEST(Reading, OutsideTheBoundsIsLeftAtThePaceOfTheCommand) {
 
 // rule L5
 TEST(Reading, OutsideTheBoundsIsNeverLeftOutwards) {
-  Rig rig(robot_with({.minimum = -1.0, .maximum = 1.0}));
+  Rig rig(limited_robot({.minimum = -1.0, .maximum = 1.0}));
   rig.observe(0, 1.2);
   rig.controller.restart(rig.observed.data(), nullptr, 0);
   // a frontend would have refused it

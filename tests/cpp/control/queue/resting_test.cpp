@@ -13,14 +13,10 @@ constexpr std::uint32_t kVelocity = 1;
 
 /// A joint of a position and a velocity that rests at `rest`.
 Schema joint(double rest, const Limits& of_velocity = {}) {
-  Schema schema;
-  schema.head.robot = NameText("robot");
-  schema.head.period = kMillisecond;
   FieldRow velocity = scalar_field("velocity", Kind::float64);
   velocity.resting = 1;
   velocity.rest = rest;
-  const auto type = schema.add_type("Joint", {scalar_field("position", Kind::float64), velocity});
-  schema.add_actuators("joint", type, 1);
+  Schema schema = robot_of({scalar_field("position", Kind::float64), velocity});
   schema.actuator(0).limits("velocity", of_velocity);
   return schema;
 }

@@ -79,10 +79,7 @@ TEST(CommandGroup, IsInvalidWholeIfOneMemberIs) {
     rig.add(0, over(1), {1.0});
     add_group(rig, {0, 1}, over(2), {2.0, 2.0});
     rig.add(1, over(1), {1.0});
-    BatchRecord record;
-    record.id = 1;
-    const auto sealed = rig.batch.seal(record);
-    std::vector<Block> blocks(sealed.begin(), sealed.end());
+    std::vector<Block> blocks = rig.sealed();
     const auto head = [&](std::size_t block) {
       return reinterpret_cast<RecordHead*>(blocks[block].bytes.data());
     };

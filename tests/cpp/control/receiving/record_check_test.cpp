@@ -35,13 +35,11 @@ StatusChange spoilt(RecordHead head, const std::vector<std::byte>& states, Spoil
   rig.add(0, direct(), {7.0, 7.0});
   rig.batch.command(head, mask, times, rows, states);
   rig.add(1, direct(), {5.0, 5.0});
-  BatchRecord record;
-  record.id = 1;
-  const auto sealed = rig.batch.seal(record);
-  std::vector<Block> blocks(sealed.begin(), sealed.end());
-  std::memcpy(&head, blocks[2].bytes.data(), sizeof head);
-  spoil(head, reinterpret_cast<double*>(blocks[2].bytes.data() + sizeof head));
-  std::memcpy(blocks[2].bytes.data(), &head, sizeof head);
+  std::vector<Block> blocks = rig.sealed();
+  edit<RecordHead>(blocks[2], [&](RecordHead& sent) {
+    spoil(sent, reinterpret_cast<double*>(blocks[2].bytes.data() + sizeof sent));
+    head = sent;
+  });
   rig.controller.take(0, rig.place(blocks), rig);
   rig.run(10);
   EXPECT_EQ(rig.witness.ends_of(3), 1U);
@@ -122,6 +120,13 @@ TEST(RecordCheck, TargetsThatAreNoNumbersAreRefused) {
   for (const double value : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
     EXPECT_TRUE(refused(direct(), [&](RecordHead&, double* state) { state[0] = value; }));
     EXPECT_TRUE(refused(direct(), [&](RecordHead&, double* state) { state[1] = value; }));
+    // in the last row of many
+    std::vector<double> rows(2 * 1000, 1.0);
+    rows.back() = value;
+    EXPECT_EQ(spoilt(
+                  over(1), bytes_of(rows), [](RecordHead&, double*) {}, {}, {}, 1000)
+                  .reason,
+              Reason::invalid);
   }
 }
 
@@ -167,16 +172,14 @@ TEST(RecordCheck, ABatchWhoseHeadIsGarbageIsRejectedWhole) {
   for (int spoil = 0; spoil < 5; ++spoil) {
     Rig rig(checked_robot());
     for (int i = 0; i < 3; ++i) rig.add(0, direct(), {7.0, 7.0});
-    const auto sealed = rig.batch.seal({});
-    std::vector<Block> blocks(sealed.begin(), sealed.end());
-    BatchRecord record;
-    std::memcpy(&record, blocks[0].bytes.data(), sizeof record);
-    if (spoil == 0) record.kind = RecordKind::command;
-    if (spoil == 1) record.records = 0xFFFFFFFF;
-    if (spoil == 2) record.records = 4;
-    if (spoil == 3) record.blocks = 3;
-    if (spoil == 4) record.blocks = 400;
-    std::memcpy(blocks[0].bytes.data(), &record, sizeof record);
+    std::vector<Block> blocks = rig.sealed(0);
+    edit<BatchRecord>(blocks[0], [&](BatchRecord& record) {
+      if (spoil == 0) record.kind = RecordKind::command;
+      if (spoil == 1) record.records = 0xFFFFFFFF;
+      if (spoil == 2) record.records = 4;
+      if (spoil == 3) record.blocks = 3;
+      if (spoil == 4) record.blocks = 400;
+    });
     rig.controller.take(0, rig.place(blocks), rig);
     rig.run(5);
     EXPECT_EQ(rig.witness.last(0).reason, Reason::invalid);
@@ -192,10 +195,8 @@ TEST(RecordCheck, ABatchWhoseHeadIsGarbageIsRejectedWhole) {
 TEST(RecordCheck, ABatchWithFewerRecordsThanBlocksFreesThemAll) {
   Rig rig(checked_robot());
   for (int i = 0; i < 3; ++i) rig.add(0, direct(), {7.0, 7.0});
-  const auto sealed = rig.batch.seal({});
-  std::vector<Block> blocks(sealed.begin(), sealed.end());
-  const std::uint32_t records = 1;
-  std::memcpy(blocks[0].bytes.data() + offsetof(BatchRecord, records), &records, 4);
+  std::vector<Block> blocks = rig.sealed(0);
+  edit<BatchRecord>(blocks[0], [](BatchRecord& record) { record.records = 1; });
   rig.controller.take(0, rig.place(blocks), rig);
   rig.run(2);
   EXPECT_EQ(rig.witness.status(2), Status::completed);
@@ -203,24 +204,16 @@ TEST(RecordCheck, ABatchWithFewerRecordsThanBlocksFreesThemAll) {
   EXPECT_TRUE(rig.all_blocks_back());
 }
 
-// Batches that were proper before bytes of theirs were changed at random: whatever they are, every
-// record ends once, every block comes back, and desired states stay numbers.
 TEST(RecordCheck, MarksWithoutTextOrWithTooMuchAreRefused) {
   for (const std::uint32_t length : {0U, kMaxMarkBytes + 1}) {
     Rig rig(checked_robot());
     rig.batch.mark(std::string(kMaxMarkBytes, 'x'));
-    BatchRecord record;
-    record.id = 1;
-    const auto sealed = rig.batch.seal(record);
-    std::vector<Block> blocks(sealed.begin(), sealed.end());
+    std::vector<Block> blocks = rig.sealed();
     blocks.resize(blocks.size() + 1);
-    record.records = 1;
-    record.blocks = static_cast<std::uint32_t>(blocks.size());
-    std::memcpy(blocks[0].bytes.data(), &record, sizeof record);
-    RecordHead head;
-    std::memcpy(&head, blocks[1].bytes.data(), sizeof head);
-    head.payload_bytes = length;
-    std::memcpy(blocks[1].bytes.data(), &head, sizeof head);
+    edit<BatchRecord>(blocks[0], [&](BatchRecord& record) {
+      record.blocks = static_cast<std::uint32_t>(blocks.size());
+    });
+    edit<RecordHead>(blocks[1], [&](RecordHead& head) { head.payload_bytes = length; });
     rig.controller.take(0, rig.place(blocks), rig);
     rig.run(2);
     EXPECT_EQ(rig.witness.last(3).reason, Reason::invalid) << length;

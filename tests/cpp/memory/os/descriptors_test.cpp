@@ -20,12 +20,11 @@ class DescriptorsTest : public SegmentTest, public testing::WithParamInterface<u
   /// True if `body` returns true in a child that has closed them.
   template <class Body>
   static bool holds_in_child(Body body) {
-    ChildProcess child([&](const ChildProcess::Ready&) {
-      for (int i = 0; i < kStandard; ++i)
-        if (is_closed(i)) ::close(i);
-      _exit(body() ? 0 : 1);
-    });
-    return child.wait() == 0;
+    return in_child([&] {
+             for (int i = 0; i < kStandard; ++i)
+               if (is_closed(i)) ::close(i);
+             return body() ? 0 : 1;
+           }) == 0;
   }
 };
 

@@ -18,25 +18,23 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-constexpr uid_t kSomebody = 65534;
-
 class FileOwnerTest : public SegmentTest {
  protected:
   ~FileOwnerTest() override { unsetenv("O80_TRUST"); }
   void SetUp() override {
-    if (geteuid() == kSomebody) GTEST_SKIP() << "this user is the other one itself";
+    if (geteuid() == kStranger) GTEST_SKIP() << "this user is the other one itself";
   }
 
   /// Both files of a segment now belong to another user; false if this user may not do that.
-  bool give_away(const OwnedSegment& segment, gid_t group = kSomebody) const {
-    return chown(directory_.file_of("arm").c_str(), kSomebody, group) == 0 &&
-           chown(commands_path("arm", segment.epoch()).c_str(), kSomebody, group) == 0;
+  bool give_away(const OwnedSegment& segment, gid_t group = kStranger) const {
+    return chown(directory_.file_of("arm").c_str(), kStranger, group) == 0 &&
+           chown(commands_path("arm", segment.epoch()).c_str(), kStranger, group) == 0;
   }
   static std::string refusal(Access access) {
     return message_of<SegmentError>([&] { AttachedSegment::attach("arm", access, soon()); });
   }
 
-  std::string somebody_ = user_name(kSomebody);
+  std::string somebody_ = user_name(kStranger);
 };
 
 constexpr auto kNotRoot = "this user may not give files away";
@@ -82,18 +80,15 @@ TEST_F(FileOwnerTest, OfASquattedNameIsNamedToTheBackendThatWantsIt) {
 TEST_F(FileOwnerTest, IsNamedAlsoWhereTheFileCannotBeOpened) {
   const OwnedSegment segment = running_segment();
   ASSERT_EQ(chmod(directory_.path().c_str(), 0777), 0);
-  ChildProcess other([&](const ChildProcess::Ready&) {
-    if (setresgid(kSomebody, kSomebody, kSomebody) != 0 ||
-        setresuid(kSomebody, kSomebody, kSomebody) != 0)
-      _exit(9);
+  const int code = in_child([&] {
+    if (!become_a_stranger()) return 9;
     const std::string owner = "of user " + user_name(0);
-    if (refusal(Access::read_only).find(owner) == std::string::npos) _exit(1);
+    if (refusal(Access::read_only).find(owner) == std::string::npos) return 1;
     const std::string said = message_of<SegmentError>([] { OwnedSegment::create(small_spec()); });
-    if (said.find(owner) == std::string::npos) _exit(2);
+    if (said.find(owner) == std::string::npos) return 2;
     const SegmentEntry entry = list_segments().at(0);
-    _exit(entry.user == user_name(0) && entry.problem.find("denied") != std::string::npos ? 0 : 3);
+    return entry.user == user_name(0) && entry.problem.find("denied") != std::string::npos ? 0 : 3;
   });
-  const int code = other.wait();
   if (code == 9) GTEST_SKIP() << "this user may not become another one";
   EXPECT_EQ(code, 0);
 }
@@ -103,7 +98,7 @@ TEST_F(FileOwnerTest, IsTrustedIfTheEnvironmentNamesIt) {
   if (!give_away(segment)) GTEST_SKIP() << kNotRoot;
 
   for (const std::string& trusted :
-       {somebody_, std::to_string(kSomebody), "ada," + somebody_, somebody_ + ",bob"}) {
+       {somebody_, std::to_string(kStranger), "ada," + somebody_, somebody_ + ",bob"}) {
     setenv("O80_TRUST", trusted.c_str(), 1);
     EXPECT_EQ(attach().life(), Life::running) << trusted;
     EXPECT_TRUE(list_segments().at(0).readable) << trusted;
@@ -127,7 +122,7 @@ TEST_F(FileOwnerTest, IsTrustedIfTheFileIsReadableByAGroupOfThisUser) {
 
 TEST_F(FileOwnerTest, OfBothFilesMustBeTheSame) {
   const OwnedSegment segment = running_segment();
-  if (chown(commands_path("arm", segment.epoch()).c_str(), kSomebody, kSomebody) != 0)
+  if (chown(commands_path("arm", segment.epoch()).c_str(), kStranger, kStranger) != 0)
     GTEST_SKIP() << kNotRoot;
   EXPECT_THAT(refusal(Access::read_write), HasSubstr("another owner"));
   EXPECT_NO_THROW(attach("arm", Access::read_only));
@@ -139,19 +134,17 @@ TEST_F(FileOwnerTest, RootIsTrustedByEverybodyWhoMayReadButNotLetToCommand) {
   spec.permission = 0644;
   const OwnedSegment segment = running_segment(spec);
   ASSERT_EQ(chmod(directory_.path().c_str(), 0755), 0);
-  ChildProcess observer([&](const ChildProcess::Ready&) {
-    if (setresgid(kSomebody, kSomebody, kSomebody) != 0 ||
-        setresuid(kSomebody, kSomebody, kSomebody) != 0)
-      _exit(9);
-    if (attach("arm", Access::read_only).life() != Life::running) _exit(1);
-    if (!list_segments().at(0).readable) _exit(2);
-    const std::string said = message_of<ReadOnly>([] { attach(); });
-    _exit(said.find("attach read-only") != std::string::npos &&
-                  said.find("--permission 660") != std::string::npos
-              ? 0
-              : 3);
-  });
-  EXPECT_EQ(observer.wait(), 0);
+  EXPECT_EQ(in_child([&] {
+              if (!become_a_stranger()) return 9;
+              if (attach("arm", Access::read_only).life() != Life::running) return 1;
+              if (!list_segments().at(0).readable) return 2;
+              const std::string said = message_of<ReadOnly>([] { attach(); });
+              return said.find("attach read-only") != std::string::npos &&
+                             said.find("--permission 660") != std::string::npos
+                         ? 0
+                         : 3;
+            }),
+            0);
 }
 
 }  // namespace

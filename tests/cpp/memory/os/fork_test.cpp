@@ -14,12 +14,6 @@ namespace {
 
 using ForkTest = SegmentTest;
 
-/// Runs `body` in a forked child; its exit code is the number of failed expectations.
-int failures_in_child(const std::function<int()>& body) {
-  ChildProcess child([&](const ChildProcess::Ready&) { _exit(body()); });
-  return child.wait();
-}
-
 TEST_F(ForkTest, MarksEveryObjectOfTheParentAsUsedAfterFork) {
   const OwnedSegment owner = running_segment();
   const AttachedSegment segment = attach();
@@ -27,7 +21,7 @@ TEST_F(ForkTest, MarksEveryObjectOfTheParentAsUsedAfterFork) {
   RowWaiter waiter(segment);
   const auto text = [](auto&& call) { return message_of<UsedAfterFork>(call); };
 
-  EXPECT_EQ(failures_in_child([&] {
+  EXPECT_EQ(in_child([&] {
               int failures = 0;
               for (const std::string& said :
                    {text([&] { segment.throw_if_gone(); }), text([&] { segment.check_process(); }),
@@ -51,7 +45,7 @@ TEST_F(ForkTest, LetsAChildOpenEverythingAgain) {
   const AttachedSegment segment = attach();
   const LaneSender sender(segment);
 
-  EXPECT_EQ(failures_in_child([&] {
+  EXPECT_EQ(in_child([&] {
               const AttachedSegment mine = attach();
               LaneSender lane(mine);
               const OwnedSegment own = running_segment(small_spec("own"));
@@ -66,7 +60,7 @@ TEST_F(ForkTest, LeavesFileLockAndLaneToTheParentWhenTheChildEndsInOrder) {
   OwnedSegment owner = running_segment();
   AttachedSegment segment = attach();
   LaneSender sender(segment);
-  EXPECT_EQ(failures_in_child([&] {
+  EXPECT_EQ(in_child([&] {
               // as if the child left the scope of its parent's objects
               {
                 const OwnedSegment gone = std::move(owner);

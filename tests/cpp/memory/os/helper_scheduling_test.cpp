@@ -55,8 +55,8 @@ void become_limited_to_priority(rlim_t priority) {
   if (setrlimit(RLIMIT_RTPRIO, &limit) != 0 || setuid(65534) != 0) _exit(kNotGranted);
 }
 
-void expect_that_all_held(ChildProcess& child) {
-  const int code = child.wait();
+void expect_that_all_held_in_child(const std::function<int()>& body) {
+  const int code = in_child(body);
   if (code == kNotGranted) GTEST_SKIP() << "no user may be given a limit here; make rt runs it";
   EXPECT_EQ(code, 0);
 }
@@ -65,16 +65,16 @@ void expect_that_all_held(ChildProcess& child) {
 class HelperSchedulingTest : public SegmentTest {
  protected:
   void expect_in_child(Scheduling expected, const std::function<void()>& set_up) {
-    ChildProcess child([&](const ChildProcess::Ready&) {
-      set_up();
-      const OwnedSegment segment = running_segment();
-      const LaneLiveness liveness(segment);
-      const Scheduling seen = scheduling_of_helper();
-      if (seen != expected)
-        ADD_FAILURE() << "policy " << seen.policy << ", priority " << seen.priority;
-      _exit(seen == expected ? 0 : 1);
-    });
-    EXPECT_EQ(child.wait(), 0);
+    EXPECT_EQ(in_child([&] {
+                set_up();
+                const OwnedSegment segment = running_segment();
+                const LaneLiveness liveness(segment);
+                const Scheduling seen = scheduling_of_helper();
+                if (seen != expected)
+                  ADD_FAILURE() << "policy " << seen.policy << ", priority " << seen.priority;
+                return seen == expected ? 0 : 1;
+              }),
+              0);
   }
   void SetUp() override {
     bool granted = false;
@@ -104,22 +104,20 @@ TEST_F(HelperSchedulingTest, SharesTheHighestPriorityThereIs) {
 }
 
 TEST_F(HelperSchedulingTest, SharesThePriorityOfTheLoopWhereNoHigherOneIsGranted) {
-  ChildProcess child([](const ChildProcess::Ready&) {
+  expect_that_all_held_in_child([] {
     const OwnedSegment segment = running_segment();
     const LaneLiveness liveness(segment);
     become_limited_to_priority(20);
-    if (LaneLiveness::run_above(20) != EPERM) _exit(3);
-    _exit(scheduling_of_helper() == Scheduling{SCHED_FIFO, 20} ? 0 : 4);
+    if (LaneLiveness::run_above(20) != EPERM) return 3;
+    return scheduling_of_helper() == Scheduling{SCHED_FIFO, 20} ? 0 : 4;
   });
-  expect_that_all_held(child);
 }
 
 TEST_F(HelperSchedulingTest, SaysWhatWillBeRefusedWhileThereIsNoBackend) {
-  ChildProcess child([](const ChildProcess::Ready&) {
+  expect_that_all_held_in_child([] {
     become_limited_to_priority(20);
-    _exit(LaneLiveness::run_above(19) == 0 && LaneLiveness::run_above(20) == EPERM ? 0 : 4);
+    return LaneLiveness::run_above(19) == 0 && LaneLiveness::run_above(20) == EPERM ? 0 : 4;
   });
-  expect_that_all_held(child);
 }
 
 TEST_F(HelperSchedulingTest, IsAnOrdinaryThreadAmongOrdinaryThreads) {

@@ -121,23 +121,20 @@ TEST_F(FirstRowTest, RaisesTheEndOfAnyOfThemWhileNoRowIsThere) {
   EXPECT_THROW(wait_for_first_row(rows(1, 0), Deadline(Timeout(0))), BackendFailed);
 }
 
-TEST_F(FirstRowTest, WaitsForReadOnlySegmentsToo) {
+TEST_F(FirstRowTest, WaitsForReadOnlySegmentsAndForMoreThanOneSleepCanHave) {
   const AttachedSegment reader = attach("ball", Access::read_only);
-  const std::array<RowOf, 2> wanted{{{&arm_.attached, 0}, {&reader, 0}}};
-  std::thread sleeper([&] { EXPECT_EQ(wait_for_first_row(wanted, patient()), Waited::ready); });
-  arm_.wait_until_wanted(0);
-  ball_.publish(0);
-  sleeper.join();
-}
-
-TEST_F(FirstRowTest, WaitsForMoreSegmentsThanOneSleepCanHave) {
   const AttachedSegment again = attach("ball");
-  std::vector<RowOf> wanted(200, RowOf{&arm_.attached, 0});
-  wanted.push_back({&again, 0});
-  std::thread sleeper([&] { EXPECT_EQ(wait_for_first_row(wanted, patient()), Waited::ready); });
-  arm_.wait_until_wanted(0);
-  ball_.publish(0);
-  sleeper.join();
+  const std::vector<RowOf> two{{&arm_.attached, 0}, {&reader, 0}};
+  std::vector<RowOf> many(200, RowOf{&arm_.attached, 1});
+  many.push_back({&again, 1});
+  Iteration k = 0;
+  for (const std::vector<RowOf>& wanted : {two, many}) {
+    std::thread sleeper([&] { EXPECT_EQ(wait_for_first_row(wanted, patient()), Waited::ready); });
+    arm_.wait_until_wanted(k);
+    ball_.publish(k);
+    sleeper.join();
+    arm_.publish(k++);
+  }
 }
 
 TEST_F(FirstRowTest, EndsWhenTheCallerSaysSo) {

@@ -72,18 +72,6 @@ TEST_F(HistoryTest, KeepsExactlyTheRowsPromised) {
   }
 }
 
-TEST_F(HistoryTest, ReadsManyRowsAtOnceAcrossTheSeamOfTheRing) {
-  publish(0, 16);
-  std::vector<Row> rows(10);
-
-  const auto range = reader_.read_range(8, 9, bytes(rows[0]));
-
-  EXPECT_EQ(range.first, 8);
-  ASSERT_EQ(range.count, 9U);
-  for (std::size_t i = 0; i < range.count; ++i)
-    EXPECT_THAT(rows[i], Each(8 + static_cast<Iteration>(i)));
-}
-
 TEST_F(HistoryTest, ReadsPartsOfRowsAtAnyPlace) {
   constexpr std::size_t kPacked = 48;
   using Packed = std::array<std::byte, kPacked>;

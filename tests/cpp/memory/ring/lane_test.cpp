@@ -146,24 +146,6 @@ TEST_F(LaneTest, TakesWhatOneProcessCausedAnotherToSendAfterItsCause) {
   for (std::uint64_t i = 0; i < kRounds; ++i) ASSERT_EQ(order[i], i + 1);
 }
 
-TEST_F(LaneTest, CommitsABatchAtOnceWhateverTheReceiverIsDoing) {
-  constexpr std::uint64_t kBatches = 3000;
-  std::thread frontend([&] {
-    LaneSender sender(attached_);
-    for (std::uint64_t number = 1; number <= kBatches; ++number) {
-      const std::size_t count = 1 + number % 9;
-      while (sender.free_blocks() < count) std::this_thread::yield();
-      send(sender, number, count);
-    }
-  });
-  std::uint64_t next = 1;
-  while (next <= kBatches) {
-    for (const std::uint64_t number : take_all()) ASSERT_EQ(number, next++);
-    give_back(0);
-  }
-  frontend.join();
-}
-
 TEST_F(LaneTest, RefusesAFrontendTooManyNamingTheHolders) {
   const AttachedSegment second_process = attach(), third_process = attach();
   const LaneSender first(attached_), second(second_process);
@@ -193,15 +175,6 @@ TEST_F(LaneTest, GoesOnWhereItsFormerOwnerLeftOff) {
   EXPECT_EQ(second.free_blocks(), 13U);
   send(second, 2);
   EXPECT_THAT(take_all(), ElementsAre(1, 2));
-}
-
-TEST_F(LaneTest, CanBeTakenAgainThroughTheSameAttachment) {
-  {
-    const LaneSender first(attached_);
-  }
-  LaneSender second(attached_);
-  send(second, 7);
-  EXPECT_THAT(take_all(), ElementsAre(7));
 }
 
 TEST_F(LaneTest, IsResetWhenItsCountersAreImpossible) {

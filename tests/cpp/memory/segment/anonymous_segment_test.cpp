@@ -37,11 +37,14 @@ TEST_F(AnonymousSegmentTest, HasNoFileInTheDirectoryAndWorksLikeANamedOne) {
 }
 
 TEST_F(AnonymousSegmentTest, EndsForItsFrontendsWithItsOwner) {
-  std::optional<OwnedSegment> owner = running_anonymous();
-  const AttachedSegment segment = AttachedSegment::attach(*owner);
-  owner.reset();
-  EXPECT_EQ(segment.life(), Life::stopped);
-  EXPECT_EQ(directory_.files(), 0U);
+  for (const bool named : {false, true}) {
+    std::optional<OwnedSegment> owner = running_anonymous();
+    if (named) owner->publish("arm");
+    const AttachedSegment segment = AttachedSegment::attach(*owner);
+    owner.reset();
+    EXPECT_EQ(segment.life(), Life::stopped);
+    EXPECT_EQ(directory_.files(), 0U);
+  }
 }
 
 TEST_F(AnonymousSegmentTest, IsLeftNowhereByAKilledProcess) {
@@ -69,14 +72,6 @@ TEST_F(AnonymousSegmentTest, GetsANameOnRequest) {
   EXPECT_EQ(second.lane(), 1U);
   EXPECT_THROW(OwnedSegment::create(small_spec("arm")), SegmentTaken);
   EXPECT_THAT(message_of<Error>([&] { owner.publish("again"); }), HasSubstr("has a name already"));
-}
-
-TEST_F(AnonymousSegmentTest, TakesItsFilesAwayAtItsEnd) {
-  {
-    OwnedSegment owner = running_anonymous();
-    owner.publish("arm");
-  }
-  EXPECT_EQ(directory_.files(), 0U);
 }
 
 TEST_F(AnonymousSegmentTest, DoesNotTakeTheNameOfALivingBackend) {

@@ -149,10 +149,11 @@ TEST_F(HaltWordTest, EachHaltThatIsShownHasItsOwnReason) {
 
 TEST_F(HaltWordTest, AForkedChildMayHalt) {
   const AttachedSegment frontend = attach();
-  ChildProcess child([&](const ChildProcess::Ready&) {
-    request_halt(frontend.view(), HaltCause::frontend, "the child", "");
-  });
-  EXPECT_EQ(child.wait(), 0);
+  EXPECT_EQ(in_child([&] {
+              request_halt(frontend.view(), HaltCause::frontend, "the child", "");
+              return 0;
+            }),
+            0);
   ASSERT_TRUE(latch_.poll());
   EXPECT_TRUE(latch_.show(0));
   EXPECT_EQ(latch_.halt().who_text(), "the child");

@@ -32,14 +32,8 @@ std::string refusal(std::uint64_t rows) {
   return message_of<SegmentError>([&] { OwnedSegment::create(spec); });
 }
 
-/// Runs in a process of its own, so that mounts and users end with it; 0 if all was as it should.
-int apart(const std::function<int()>& body) {
-  ChildProcess child([&](const ChildProcess::Ready&) { _exit(body()); });
-  return child.wait();
-}
-
 TEST_F(DirectoryTest, ThatIsFullRefusesWhatDoesNotFitNamingTheCureAndStaysUsable) {
-  const int code = apart([&] {
+  const int code = in_child([&] {
     const char* directory = directory_.path().c_str();
     // of 256 pages, however large a page is
     const auto bytes = 256 * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
@@ -74,9 +68,9 @@ TEST_F(DirectoryTest, ThatIsFullRefusesWhatDoesNotFitNamingTheCureAndStaysUsable
 
 TEST_F(DirectoryTest, ThatIsNotOursToWriteSaysSo) {
   ASSERT_EQ(chmod(directory_.path().c_str(), 0555), 0);
-  const int code = apart([&] {
+  const int code = in_child([&] {
     // permissions bind everybody but root
-    if (geteuid() == 0 && setresuid(65534, 65534, 65534) != 0) return kNotPermitted;
+    if (geteuid() == 0 && !become_a_stranger()) return kNotPermitted;
     const std::string said = refusal(1);
     std::fprintf(stderr, "%s\n", said.c_str());
     return said.find(directory_.path()) != std::string::npos &&
@@ -106,8 +100,8 @@ TEST_F(DirectoryTest, ThatIsMissingIsNamedByEveryVerb) {
 TEST_F(DirectoryTest, HidesAFileOfAnotherUserButSaysWhatToDo) {
   const OwnedSegment owner = running_segment();
   ASSERT_EQ(chmod(directory_.path().c_str(), 0755), 0);
-  const int code = apart([&] {
-    if (geteuid() == 0 && setresuid(65534, 65534, 65534) != 0) return kNotPermitted;
+  const int code = in_child([&] {
+    if (geteuid() == 0 && !become_a_stranger()) return kNotPermitted;
     if (access(directory_.file_of("arm").c_str(), R_OK) == 0) return kNotPermitted;
     const std::string write = message_of<SegmentError>(
         [] { AttachedSegment::attach("arm", Access::read_write, soon()); });

@@ -55,27 +55,6 @@ TEST_F(SignalTest, WakesASleeperByItsRowAndByNoEarlierOne) {
   EXPECT_EQ(wanted(), kNobody);
 }
 
-TEST_F(SignalTest, WakesEveryoneOfManyWaitersForDifferentRows) {
-  constexpr int kSleepers = 32;
-  constexpr Iteration kLast = 200;
-  std::atomic<int> done{0};
-  std::vector<std::thread> sleepers;
-  sleepers.reserve(kSleepers);
-  for (int i = 0; i < kSleepers; ++i)
-    sleepers.emplace_back([&, i] {
-      RowWaiter waiter(attached_);
-      for (Iteration k = i % 7; k <= kLast; k += 1 + i % 5)
-        ASSERT_EQ(waiter.wait_for_row(k, patient()), Waited::ready);
-      ++done;
-    });
-  for (Iteration k = 0; k <= kLast; ++k) {
-    publish(k, k);
-    std::this_thread::yield();
-  }
-  for (std::thread& sleeper : sleepers) sleeper.join();
-  EXPECT_EQ(done, kSleepers);
-}
-
 TEST_F(SignalTest, LetsReadersWithoutWritePermissionPoll) {
   const AttachedSegment reader = attach("arm", Access::read_only);
   std::atomic<bool> requested{false};

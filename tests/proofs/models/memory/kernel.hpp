@@ -69,26 +69,16 @@ class Segment {
     current() = this;
     make(view.counters().begun, -1);
     make(view.counters().published, -1);
-    make(view.counters().first);
-    make(view.counters().next_at);
-    make(view.counters().processor);
+    make_all(view.counters().first, view.counters().next_at, view.counters().processor);
     make(view.counters().state, static_cast<std::uint32_t>(o80::BackendState::running));
-    make(view.wakes().row_wake);
-    make(view.wakes().lane_wake);
-    make(view.wakes().sleeping);
-    make(view.bell().rung);
-    make(view.bell().tickets);
+    make_all(view.wakes().row_wake, view.wakes().lane_wake, view.wakes().sleeping);
+    make_all(view.bell().rung, view.bell().tickets, view.bell().passed_on, view.bell().halts);
     make(view.bell().wanted, std::numeric_limits<std::int64_t>::max());
-    make(view.bell().passed_on);
-    make(view.bell().halts);
     for (o80::HaltSlot& reason : view.bell().reasons) make(reason);
-    make(view.counters().halted);
-    make(view.counters().cleared);
-    make(view.counters().halt);
+    make_all(view.counters().halted, view.counters().cleared, view.counters().halt);
     words(view.history(), row_words * slots, false);
     if (journal_bytes > 0) {
-      make(view.counters().journal.begun);
-      make(view.counters().journal.published);
+      make_all(view.counters().journal.begun, view.counters().journal.published);
       for (auto& mark : view.counters().journal.marks) make(mark);
       words(view.journal(), journal_bytes / 8, false);
     }
@@ -134,14 +124,11 @@ class Segment {
     std::construct_at(&place, static_cast<T>(value));
     destroyers_.push_back([&place] { std::destroy_at(&place); });
   }
-  void make(o80::HaltSlot& slot) {
-    make(slot.number);
-    make(slot.iteration);
-    make(slot.cause);
-  }
-  void make(o80::BurstSlot& slot) {
-    make(slot.id);
-    make(slot.row);
+  void make(o80::HaltSlot& slot) { make_all(slot.number, slot.iteration, slot.cause); }
+  void make(o80::BurstSlot& slot) { make_all(slot.id, slot.row); }
+  template <class... Places>
+  void make_all(Places&... places) {
+    (make(places), ...);
   }
   void words(const std::byte* begin, std::size_t count, bool ordered) {
     Region& region = regions_.emplace_back(Region{begin, {}});
@@ -149,28 +136,15 @@ class Segment {
   }
   void make_lane(std::uint32_t i) {
     o80::LaneSenderPage& page = view.lane(i);
-    make(page.committed);
-    make(page.incarnation);
-    make(page.closed);
-    make(page.dead_incarnation);
-    make(page.successor_begin);
-    make(page.owner_begin);
-    make(page.next_id);
-    make(page.waiting);
-    make(page.cancels);
+    make_all(page.committed, page.incarnation, page.closed, page.dead_incarnation,
+             page.successor_begin, page.owner_begin, page.next_id, page.waiting, page.cancels);
     for (auto& cancelled : page.cancelled) make(cancelled);
     o80::LaneFeedback& feedback = view.feedback(i);
-    make(feedback.freed);
-    make(feedback.burst);
-    make(feedback.bursts);
-    make(feedback.events);
-    make(feedback.ids);
-    make(feedback.incarnation);
+    make_all(feedback.freed, feedback.burst, feedback.bursts, feedback.events, feedback.ids,
+             feedback.incarnation);
     for (std::size_t k = 0; k < kRemembered; ++k) make(feedback.recent_bursts[k]);
-    for (std::size_t k = 0; k < 2 * view.shape.lane_blocks; ++k) {
-      make(view.statuses(i)[k].id);
-      make(view.statuses(i)[k].word);
-    }
+    for (std::size_t k = 0; k < 2 * view.shape.lane_blocks; ++k)
+      make_all(view.statuses(i)[k].id, view.statuses(i)[k].word);
     words(view.transport(i), view.shape.lane_blocks * o80::kBlockSize / 8, true);
     make(locks_[o80::kFirstLaneByte + i]);
   }
