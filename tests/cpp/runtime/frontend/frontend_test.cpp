@@ -80,6 +80,16 @@ TEST_F(FrontendTest, RefusesATrajectoryWhoseTimesMakeNoSense) {
 
 // ------------------------------------------------------------------------------ sending
 
+TEST_F(FrontendTest, AnEmptyBatchReturnsAtOnce) {
+  auto [manual, frontend] = StartedPair();
+  const Batch batch = frontend.pulse();
+  EXPECT_TRUE(batch.empty());
+  EXPECT_TRUE(batch.ended());
+  batch.wait(std::nullopt);
+  EXPECT_EQ(batch.first_iteration(), -1);
+  EXPECT_EQ(batch.rejection(), "");
+}
+
 // rule B6
 TEST_F(FrontendTest, AFullLaneIsAnErrorAndNothingIsSentAndNothingIsLost) {
   auto [manual, frontend] = StartedPair({.segment = "pair", .lane_blocks = 64});
