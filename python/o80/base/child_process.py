@@ -73,13 +73,14 @@ def ends_within(child: subprocess.Popen[bytes], timeout: float | None) -> bool:
 def end_child(
     child: subprocess.Popen[bytes], grace: float, also: signal.Signals | None = None
 ) -> None:
-    """Ends the child's standard input, sends a signal `also`, and kills it after `grace` [s]."""
-    if child.stdin is not None:
-        with contextlib.suppress(OSError):
-            child.stdin.close()
+    """Sends a signal `also`, ends the child's standard input, and kills it after `grace` [s]."""
+    # the signal first: a child that ends by its input soon has no handler any more
     if also is not None:
         with contextlib.suppress(OSError):  # refused: the end of the child's input ends it, too
             child.send_signal(also)
+    if child.stdin is not None:
+        with contextlib.suppress(OSError):
+            child.stdin.close()
     if not ends_within(child, grace):
         child.kill()
     # an interrupt inside Popen may have left its lock taken; OSError: wait4 is refused

@@ -15,14 +15,14 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from types import CodeType, FrameType
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from blocking import CALLS
 from processes import WAIT, Running
 
 import o80
-from o80.base.child_process import start_child
+from o80.base.child_process import end_child, start_child
 from o80.recording.locked_file import LockedFile
 from o80.robots.process import Process
 
@@ -379,6 +379,37 @@ def test_a_child_that_is_lost_ends() -> None:
         assert select.select([end], [], [], WAIT)[0]
     finally:
         os.close(end)
+
+
+ENDS_BY_ITS_INPUT = """
+import os, signal, sys, time
+signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
+print("ready", flush=True)
+sys.stdin.read()
+signal.signal(signal.SIGTERM, signal.SIG_DFL)  # as a robot at the end of its process
+print("ended", flush=True)
+time.sleep(60)
+"""
+
+
+def test_a_child_that_ends_at_the_end_of_its_input_is_not_killed_by_the_signal_after_it() -> None:
+    child = start_child([sys.executable, "-c", ENDS_BY_ITS_INPUT], stdout=subprocess.PIPE)
+    output, pipe = child.stdout, child.stdin
+    assert output is not None
+    assert pipe is not None
+    assert output.readline() == b"ready\n"
+
+    class SlowPipe:
+        def close(self) -> None:
+            pipe.close()
+            output.readline()  # until the child has seen it
+
+    child.stdin = cast("Any", SlowPipe())
+    with output:
+        end_child(child, WAIT, signal.SIGTERM)
+    child.stdin = pipe
+
+    assert child.returncode == 0
 
 
 @pytest.mark.parametrize("kind", [o80.InlineGroup, o80.Recording, Process, LockedFile])
