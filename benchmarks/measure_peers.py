@@ -4,6 +4,7 @@ A package that is not installed is skipped.
 """
 
 import ctypes
+import os
 import subprocess
 import sys
 import tempfile
@@ -156,12 +157,13 @@ def service() -> Any:
 
 
 def serve() -> None:
-    """Answers until it is terminated, polling."""
+    """Answers until it is terminated, or its parent has ended; it polls."""
+    parent = os.getppid()
     ended: list[int] = []  # an exception in the handler can be lost in a destructor
     signal(SIGTERM, lambda number, _: ended.append(number))  # it removes its files
     server = service().server_builder().create()
     print(flush=True)
-    while not ended:
+    while not ended and os.getppid() == parent:
         if (request := server.receive()) is not None:
             request.payload()
             request.send_copy(Answered())

@@ -203,13 +203,13 @@ def test_all_bindings_include_all_casters_by_one_header() -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (34_401, 0),
-    "python/bindings": (5_724, 0),
-    "python/o80": (30_040, 0),
+    "include, src": (34_397, 0),
+    "python/bindings": (5_507, 0),
+    "python/o80": (29_850, 0),
     "python/o80/hybrid": (2_458, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_479, 0),
     "python/o80/view/page": (1_222, 0),
-    "docs": (571, 0),
+    "docs": (565, 0),
     "devices": (8_849, 4_498),
     "gateways/lerobot": (529, 686),
     "gateways/ros2": (903, 955),
@@ -217,9 +217,9 @@ CEILINGS = {
     "robots/pam, robots/two_joints": (2_108, 1_184),
     "simulators/mujoco": (5_372, 4_686),
     "apps/table_tennis": (8_399, 4_409),
-    "benchmarks, tools": (4_384, 0),
+    "benchmarks, tools": (4_306, 0),
     "examples": (1_985, 0),
-    "tests, conftest.py": (0, 62_358),
+    "tests, conftest.py": (0, 59_581),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

@@ -397,12 +397,13 @@ def test_a_child_that_ends_at_the_end_of_its_input_is_not_killed_by_the_signal_a
     output, pipe = child.stdout, child.stdin
     assert output is not None
     assert pipe is not None
-    assert output.readline() == b"ready\n"
+    end, seen = pipe.close, output.readline
+    assert seen() == b"ready\n"
 
     class SlowPipe:
         def close(self) -> None:
-            pipe.close()
-            output.readline()  # until the child has seen it
+            end()
+            seen()  # until the child has seen it
 
     child.stdin = cast("Any", SlowPipe())
     with output:

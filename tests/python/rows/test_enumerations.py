@@ -219,7 +219,7 @@ def test_a_number_without_a_label_stays_a_number() -> None:
     gear = enumeration_of("gear", (("off", 0), ("on", 2)))
     for value in (gear(7), pickle.loads(pickle.dumps(gear(7)))):
         assert (value == 7, value == "on", value != "on", str(value)) == (True, False, True, "7")
-    array = labelled(np.array([2, 7]), gear)
+    array: Any = labelled(np.array([2, 7]), gear)
     assert (array == "on").tolist() == [True, False]
     assert array.labels().tolist() == ["on", "7"]
 
