@@ -14,15 +14,12 @@ from numpy.typing import NDArray
 
 from o80.base.arrays import FloatArray
 
-from ..world.arm import MUSCLES
-
 FINE = 0.05
 """Factor of the actions in the published fine configuration."""
 COARSE = 1.0
 """Factor of the actions in the published coarse configuration."""
 
-_ZEROS, _ONES = np.zeros(MUSCLES), np.ones(MUSCLES)
-_MINUS_ONES = -_ONES
+_ZERO, _ONE, _MINUS_ONE = np.array(0.0), np.array(1.0), np.array(-1.0)  # faster than numbers
 
 
 def largest_change(factor: float) -> float:
@@ -45,11 +42,11 @@ def changed_pressures(
     # the sum of squares is finite only if all numbers are, and not too large
     if not math.isfinite(np.vdot(action, action)) and not np.isfinite(action).all():
         raise ValueError(f"an action must be finite, got {action}")
-    changed: FloatArray = np.minimum(np.maximum(action, _MINUS_ONES), _ONES)
+    changed: FloatArray = np.minimum(np.maximum(action, _MINUS_ONE), _ONE)
     changed *= 0.5 * factor
     np.tanh(changed, out=changed)
     changed *= 0.5
     changed += pressures
-    np.maximum(changed, _ZEROS, out=changed)
-    np.minimum(changed, _ONES, out=changed)
+    np.maximum(changed, _ZERO, out=changed)
+    np.minimum(changed, _ONE, out=changed)
     return changed
