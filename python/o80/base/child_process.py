@@ -18,8 +18,10 @@ COLLECT = 1.0  # [s] for the exit code of a process that has ended
 POLL = 0.01  # [s] between checks of a process that has no descriptor
 
 
-class _Child(subprocess.Popen[bytes]):
+class Child(subprocess.Popen[bytes]):
     """A child that ends when it is garbage collected, for example after an early Ctrl-C."""
+
+    signalled = False  #: end_child() has sent a signal
 
     def __del__(self) -> None:
         # Popen keeps a lost process that runs, and its pipes with it
@@ -33,7 +35,7 @@ class _Child(subprocess.Popen[bytes]):
 _children: WeakSet[subprocess.Popen[bytes]] = WeakSet()
 
 
-def start_child(command: Sequence[str | Path], **options: Any) -> subprocess.Popen[bytes]:
+def start_child(command: Sequence[str | Path], **options: Any) -> Child:
     """Starts a program that ends at the end of its standard input. options: of Popen.
 
     A forked child of this process closes the program's pipes, so that it ends with the parent.
@@ -42,7 +44,7 @@ def start_child(command: Sequence[str | Path], **options: Any) -> subprocess.Pop
     # Not a session of its own: the kernel divides processor time between sessions first, so a robot
     # alone would get as much as all programs that read it.
     with above_standard():
-        child = _Child(command, stdin=subprocess.PIPE, process_group=0, **options)
+        child = Child(command, stdin=subprocess.PIPE, process_group=0, **options)
     _children.add(child)
     return child
 
@@ -70,12 +72,11 @@ def ends_within(child: subprocess.Popen[bytes], timeout: float | None) -> bool:
     return child.returncode is not None
 
 
-def end_child(
-    child: subprocess.Popen[bytes], grace: float, also: signal.Signals | None = None
-) -> None:
+def end_child(child: Child, grace: float, also: signal.Signals | None = None) -> None:
     """Sends a signal `also`, ends the child's standard input, and kills it after `grace` [s]."""
-    # the signal first: a child that ends by its input soon has no handler any more
-    if also is not None:
+    # once, and before the input ends: a child that is ending has no handler any more
+    if also is not None and not child.signalled:
+        child.signalled = True
         with contextlib.suppress(OSError):  # refused: the end of the child's input ends it, too
             child.send_signal(also)
     if child.stdin is not None:

@@ -94,7 +94,8 @@ def _stepped(task: Task, copies: Index, stepped: NDArray[np.bool_] | None = None
         if not isinstance(outcome, Outcome):
             name = type(task).__name__
             raise InvalidArgument(f"{name}.judge must return an Outcome, got {outcome!r}")
-        rewards[judged] = reward = outcome.reward
+        reward = outcome.reward
+        _put(rewards, judged, reward, task, "reward")
         whole = math.isfinite(reward) if type(reward) is float else np.isfinite(rewards).all()
         if not whole:
             copy = int(np.flatnonzero(~np.isfinite(rewards))[0])
@@ -102,10 +103,10 @@ def _stepped(task: Task, copies: Index, stepped: NDArray[np.bool_] | None = None
                 f"{type(task).__name__}.judge gave copy {copy} the reward {rewards[copy]}: it must "
                 "be finite, because any other value breaks the policy that learns from it"
             )
-        terminated[judged] = outcome.terminated
+        _put(terminated, judged, outcome.terminated, task, "terminated")
         if halted.size:
             terminated[halted] = True
-        truncated[judged] = outcome.truncated
+        _put(truncated, judged, outcome.truncated, task, "truncated")
         if late is not None:
             truncated[judged] |= late[judged]
         judged_info = outcome.info
@@ -121,6 +122,16 @@ def _stepped(task: Task, copies: Index, stepped: NDArray[np.bool_] | None = None
         halted,
         {"halt": [task.halts[copy] for copy in halted.tolist()]} if halted.size else {},
     )
+
+
+def _put(all_copies: Any, judged: NDArray[np.intp], given: Any, task: Task, name: str) -> None:
+    try:
+        all_copies[judged] = given
+    except (TypeError, ValueError, OverflowError):
+        raise InvalidArgument(
+            f"{type(task).__name__}.judge must give {name} as one value, or one for each of the "
+            f"{judged.size} judged copies, got {given!r}"
+        ) from None
 
 
 def no_step(task: Task) -> Stepped:

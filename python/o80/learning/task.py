@@ -146,8 +146,8 @@ class Task(ABC):
             # NumPy is slow where it repeats the bounds of one copy, and np.clip is slower
             low, high = (np.broadcast_to(each, shape).copy() for each in (space.low, space.high))
             self._bounds = space, low, high
-        if (count := len(actions)) < self.copies:
-            low, high = low[:count], high[:count]
+        if getattr(actions, "shape", None) != low.shape:
+            low, high = space.low, space.high
         return np.minimum(np.maximum(actions, low), high)
 
     @abstractmethod

@@ -381,29 +381,36 @@ def test_a_child_that_is_lost_ends() -> None:
         os.close(end)
 
 
-ENDS_BY_ITS_INPUT = """
-import os, signal, sys, time
-signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
+ENDING = """
+import signal, sys, time
+def end(*_):
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # as a robot at the end of its process
+    print("ended", flush=True)
+signal.signal(signal.SIGTERM, end)
 print("ready", flush=True)
 sys.stdin.read()
-signal.signal(signal.SIGTERM, signal.SIG_DFL)  # as a robot at the end of its process
-print("ended", flush=True)
-time.sleep(60)
+if signal.getsignal(signal.SIGTERM) is end:  # the input has ended first
+    end()
+    time.sleep(60)
 """
 
 
-def test_a_child_that_ends_at_the_end_of_its_input_is_not_killed_by_the_signal_after_it() -> None:
-    child = start_child([sys.executable, "-c", ENDS_BY_ITS_INPUT], stdout=subprocess.PIPE)
+def test_a_child_that_is_ending_gets_no_signal() -> None:
+    """Neither after the end of its input nor by a second thread that ends it."""
+    child = start_child([sys.executable, "-c", ENDING], stdout=subprocess.PIPE)
     output, pipe = child.stdout, child.stdin
     assert output is not None
     assert pipe is not None
-    end, seen = pipe.close, output.readline
+    seen, end = output.readline, pipe.close
     assert seen() == b"ready\n"
 
     class SlowPipe:
         def close(self) -> None:
-            end()
-            seen()  # until the child has seen it
+            if not child.signalled:
+                end()
+            seen()  # until the child is ending
+            child.stdin = pipe
+            end_child(child, WAIT, signal.SIGTERM)
 
     child.stdin = cast("Any", SlowPipe())
     with output:

@@ -3,6 +3,7 @@
 import os
 import warnings
 from collections.abc import Iterator
+from contextlib import closing
 from copy import deepcopy
 from dataclasses import dataclass
 from itertools import combinations
@@ -172,15 +173,35 @@ def test_mistakes_are_named() -> None:
             VectorEnvironment(vector.task, render_mode="human")
 
 
-def test_what_judge_returns_is_checked() -> None:
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (np.zeros(3), r"Wrong\.judge must return an .*Outcome"),
+        (Outcome(reward=np.ones((3, 1))), "judge must give reward as one value, or one for each"),
+        (Outcome(reward="high"), "one for each of the 3 judged copies, got 'high'"),
+        (Outcome(terminated=[True, False]), r"give terminated as .* got \[True, False\]"),
+        (Outcome(truncated=np.zeros((3, 3))), "judge must give truncated as one value"),
+        (Outcome(reward=[0.0, np.inf, 0.0]), "gave copy 1 the reward inf: it must be finite"),
+        (Outcome(reward=float("nan")), "gave copy 0 the reward nan"),
+    ],
+)
+def test_what_judge_returns_is_checked(given: Any, message: str) -> None:
     class Wrong(Reach):
         def judge(self, copies: Any) -> Any:
-            return np.zeros(len(copies))
+            return given
 
-    with Environment(Wrong(max_steps=1)) as environment:
+    with VectorEnvironment(Wrong(3, max_steps=1)) as environment:
         environment.reset(seed=1)
-        with pytest.raises(o80.InvalidArgument, match=r"Wrong\.judge must return an .*Outcome"):
-            environment.step(np.zeros(4, np.float32))
+        with pytest.raises(o80.InvalidArgument, match=message):
+            environment.step(np.zeros((3, 4), np.float32))
+
+
+def test_actions_of_any_number_of_axes_are_clipped() -> None:
+    with closing(Reach(2)) as task:
+        for shape in ((4,), (1, 4), (2, 4), (2, 5, 4), (7, 4)):
+            assert task.clipped(np.full(shape, 9.0)).tolist() == np.ones(shape).tolist()
+        task.action_space = Box(-2, 2, (4,), np.float32)
+        assert task.clipped([[9, -9, 0, 1]] * 2).tolist() == [[2, -2, 0, 1]] * 2
 
 
 def test_gymnasium_makes_a_registered_task() -> None:
