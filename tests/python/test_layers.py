@@ -205,7 +205,7 @@ def test_all_bindings_include_all_casters_by_one_header() -> None:
 CEILINGS = {
     "include, src": (34_397, 0),
     "python/bindings": (5_507, 0),
-    "python/o80": (29_862, 0),
+    "python/o80": (29_863, 0),
     "python/o80/hybrid": (2_458, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_479, 0),
     "python/o80/view/page": (1_222, 0),
@@ -219,7 +219,7 @@ CEILINGS = {
     "apps/table_tennis": (8_399, 4_409),
     "benchmarks, tools": (4_306, 0),
     "examples": (1_985, 0),
-    "tests, conftest.py": (0, 59_609),
+    "tests, conftest.py": (0, 59_616),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

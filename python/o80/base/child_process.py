@@ -18,10 +18,8 @@ COLLECT = 1.0  # [s] for the exit code of a process that has ended
 POLL = 0.01  # [s] between checks of a process that has no descriptor
 
 
-class Child(subprocess.Popen[bytes]):
+class _Child(subprocess.Popen[bytes]):
     """A child that ends when it is garbage collected, for example after an early Ctrl-C."""
-
-    signalled = False  #: end_child() has sent a signal
 
     def __del__(self) -> None:
         # Popen keeps a lost process that runs, and its pipes with it
@@ -33,9 +31,10 @@ class Child(subprocess.Popen[bytes]):
 
 
 _children: WeakSet[subprocess.Popen[bytes]] = WeakSet()
+_signalled: WeakSet[subprocess.Popen[bytes]] = WeakSet()
 
 
-def start_child(command: Sequence[str | Path], **options: Any) -> Child:
+def start_child(command: Sequence[str | Path], **options: Any) -> subprocess.Popen[bytes]:
     """Starts a program that ends at the end of its standard input. options: of Popen.
 
     A forked child of this process closes the program's pipes, so that it ends with the parent.
@@ -44,7 +43,7 @@ def start_child(command: Sequence[str | Path], **options: Any) -> Child:
     # Not a session of its own: the kernel divides processor time between sessions first, so a robot
     # alone would get as much as all programs that read it.
     with above_standard():
-        child = Child(command, stdin=subprocess.PIPE, process_group=0, **options)
+        child = _Child(command, stdin=subprocess.PIPE, process_group=0, **options)
     _children.add(child)
     return child
 
@@ -72,11 +71,13 @@ def ends_within(child: subprocess.Popen[bytes], timeout: float | None) -> bool:
     return child.returncode is not None
 
 
-def end_child(child: Child, grace: float, also: signal.Signals | None = None) -> None:
+def end_child(
+    child: subprocess.Popen[bytes], grace: float, also: signal.Signals | None = None
+) -> None:
     """Sends a signal `also`, ends the child's standard input, and kills it after `grace` [s]."""
     # once, and before the input ends: a child that is ending has no handler any more
-    if also is not None and not child.signalled:
-        child.signalled = True
+    if also is not None and child not in _signalled:
+        _signalled.add(child)
         with contextlib.suppress(OSError):  # refused: the end of the child's input ends it, too
             child.send_signal(also)
     if child.stdin is not None:

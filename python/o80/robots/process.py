@@ -12,7 +12,7 @@ from typing import IO, Any
 
 import o80._core as _core
 from o80.base import lifecycle
-from o80.base.child_process import Child, end_child, ends_within, start_child
+from o80.base.child_process import end_child, ends_within, start_child
 from o80.base.descriptors import above_standard
 from o80.base.errors import (
     DriverError,
@@ -39,7 +39,7 @@ class Process(lifecycle.Managed):
 
     _owner = 0  # an interrupt may come before it is set
 
-    def __init__(self, popen: Child, segment: str, output: IO[bytes]) -> None:
+    def __init__(self, popen: subprocess.Popen[bytes], segment: str, output: IO[bytes]) -> None:
         self._popen = popen
         self._output = output
         self.segment = segment  #: name of its segment
@@ -116,7 +116,7 @@ class Process(lifecycle.Managed):
             )
 
     @property
-    def _own(self) -> Child:
+    def _own(self) -> subprocess.Popen[bytes]:
         self._check_process()
         return self._popen
 

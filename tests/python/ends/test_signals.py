@@ -395,18 +395,25 @@ if signal.getsignal(signal.SIGTERM) is end:  # the input has ended first
 """
 
 
-def test_a_child_that_is_ending_gets_no_signal() -> None:
+def test_a_child_that_is_ending_gets_no_signal(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither after the end of its input nor by a second thread that ends it."""
     child = start_child([sys.executable, "-c", ENDING], stdout=subprocess.PIPE)
     output, pipe = child.stdout, child.stdin
     assert output is not None
     assert pipe is not None
-    seen, end = output.readline, pipe.close
+    seen, end, send = output.readline, pipe.close, child.send_signal
+    signals: list[int] = []
+
+    def send_signal(number: int) -> None:
+        signals.append(number)
+        send(number)
+
+    monkeypatch.setattr(child, "send_signal", send_signal)
     assert seen() == b"ready\n"
 
     class SlowPipe:
         def close(self) -> None:
-            if not child.signalled:
+            if not signals:
                 end()
             seen()  # until the child is ending
             child.stdin = pipe
