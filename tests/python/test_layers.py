@@ -219,7 +219,7 @@ CEILINGS = {
     "apps/table_tennis": (8_399, 4_409),
     "benchmarks, tools": (4_306, 0),
     "examples": (1_985, 0),
-    "tests, conftest.py": (0, 59_616),
+    "tests, conftest.py": (0, 59_617),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}
