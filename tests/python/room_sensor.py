@@ -1,6 +1,8 @@
 """Python drivers for tests, in a module that other processes also import."""
 
 import os
+import signal
+import time
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -156,8 +158,6 @@ class Paced:
         self.due = 0
 
     def wait(self, due: int) -> None:
-        import time
-
         self.due = due
         time.sleep(max(0.0, due - time.monotonic_ns()) * 1e-9)
 
@@ -174,3 +174,46 @@ class Spins:
         while reading.iteration == 3 and os.sched_getparam(0).sched_priority > 0:
             pass
         reading.extended["policy"] = os.sched_getscheduler(0)
+
+
+class Hanging:
+    """Hangs in the verb that an option names, or is late in each `write`."""
+
+    actuators = ("a",)
+    simulated = True
+
+    @dataclass
+    class Config:
+        verb: str = "none"
+
+    def __init__(self, config: Config) -> None:
+        self.verb = config.verb
+
+    def _hang_in(self, verb: str) -> None:
+        while self.verb == verb:
+            signal.pause()
+
+    def start(self) -> None:
+        self._hang_in("start")
+
+    def write(self, desired: Desired) -> None:
+        if desired.iteration == 20:
+            self._hang_in("write")
+        if self.verb == "late":
+            time.sleep(0.005)
+
+    def read(self, reading: Reading) -> None: ...
+
+
+class Silent:
+    """Does not say whether it is simulated; is elsewhere after a halt."""
+
+    actuators = ("a",)
+    limits = {"a": o80.Limits(speed=2.0)}  # noqa: RUF012
+    place = 0.0
+
+    def read(self, reading: Reading) -> None:
+        reading.observed[0] = self.place
+
+    def halt(self) -> None:
+        self.place = 30.0

@@ -1,37 +1,14 @@
 """A backend inside a Python program, by its own clock and bursting."""
 
 import contextlib
-import threading
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+from manual_backend import ManualBackend
 from processes import WAIT
 
 import o80
-
-
-@contextlib.contextmanager
-def running(backend: o80.Backend) -> Iterator[list[Exception]]:
-    """A robot that is at once where it is asked to be, in a thread; what this raised."""
-    raised: list[Exception] = []
-
-    def run() -> None:
-        try:
-            while (desired := backend.step()) is not None:
-                backend.publish(desired)
-        except Exception as error:
-            raised.append(error)
-            backend.__exit__(type(error), error, None)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    yield raised
-    if not raised:
-        backend.stop()
-    thread.join(WAIT)
-    assert not thread.is_alive()
 
 
 def test_the_two_verbs_make_a_robot(segment: str) -> None:
@@ -45,31 +22,19 @@ def test_the_two_verbs_make_a_robot(segment: str) -> None:
             frontend.add_command("a", 1.0, iterations=2)
             frontend.pulse()
             first = backend.step()
+            assert first.tolist() == [0.75, -0.5]
             backend.publish(first)
+            first[:] = 99.0  # desired states are fresh arrays
             second = backend.step()
             backend.publish(second)
 
-            assert first.tolist() == [0.75, -0.5]
             assert second.tolist() == [1.0, -0.5]
+            assert first.tolist() == [99.0, 99.0]
             assert frontend.latest().observed.tolist() == [1.0, -0.5]
             assert frontend.frequency == pytest.approx(100.0)
             assert not frontend.bursting
             assert backend.iteration == 3
             assert frontend.robot == segment
-
-
-def test_desired_states_are_fresh_arrays(segment: str) -> None:
-    with o80.Backend(segment, ["a"]) as backend:
-        backend.publish([0.0])
-        with o80.Frontend(segment) as frontend:
-            first = backend.step()
-            first[0] = 99.0
-            backend.publish([0.0])
-            frontend.add_command(0, 1.0)
-            frontend.pulse()
-
-            assert backend.step().tolist() == [1.0]
-            assert first.tolist() == [99.0]
 
 
 def test_published_values_stay_until_they_are_given_anew(segment: str) -> None:
@@ -156,45 +121,43 @@ def test_requests_reach_their_handlers(segment: str) -> None:
     def reset(request: o80.Record) -> None:
         heard.append((int(request.seed), request.pose.tolist()))
 
-    with o80.Backend(segment, ["a"], requests=REQUESTS, bursting=True) as backend:
-        backend.on("reset", reset)
+    with ManualBackend(segment, ["a"], requests=REQUESTS) as robot:
+        robot.backend.on("reset", reset)
         home: Any = list(REQUESTS).index("home")  # a request by its number, as elsewhere
-        backend.on(home, lambda request: heard.append(len(request)))
-        backend.publish([0.0])
-        with running(backend), o80.Frontend(segment) as frontend:
-            frontend.request("reset", seed=2**63, pose=[1.0, 2.0], timeout=WAIT)
-            frontend.request("home", timeout=WAIT)
-            with pytest.raises(o80.RequestRejected, match="request 'brake' has no handler"):
-                frontend.request("brake", timeout=WAIT)
+        robot.backend.on(home, lambda request: heard.append(len(request)))
+        robot.frontend.add_request("reset", seed=2**63, pose=[1.0, 2.0])
+        robot.frontend.add_request("home")
+        robot.frontend.add_request("brake")
+        batch = robot.frontend.pulse()
+        robot.run()
 
     assert heard == [(2**63, [1.0, 2.0]), 0]
+    assert batch.statuses == ["completed", "completed", "rejected"]
+    assert "request 'brake' has no handler" in batch[2].text
 
 
 def test_a_handler_may_start_afresh(segment: str) -> None:
-    with o80.Backend(
-        segment, ["a", "b"], extended={"n": int}, requests=REQUESTS, bursting=True
-    ) as backend:
-        backend.on("reset", lambda _: o80.StartAfresh([3.0, 4.0], {"n": 5}))
-        backend.on("home", lambda _: o80.StartAfresh([3.0, 4.0], desired=[1.0, 2.0]))
-        backend.publish([0.0, 0.0])
-        with running(backend), o80.Frontend(segment) as frontend:
-            frontend.add_command(0, 1.0, iterations=100)
-            batch = frontend.pulse()
-            frontend.burst(10, timeout=WAIT)
+    with ManualBackend(segment, ["a", "b"], extended={"n": int}, requests=REQUESTS) as robot:
+        robot.backend.on("reset", lambda _: o80.StartAfresh([3.0, 4.0], {"n": 5}))
+        robot.backend.on("home", lambda _: o80.StartAfresh([3.0, 4.0], desired=[1.0, 2.0]))
+        arm = robot.frontend
+        arm.add_command(0, 1.0, iterations=100)
+        batch = arm.pulse()
+        robot.run(10)
+        arm.add_request("reset", seed=0, pose=[0.0, 0.0])
+        arm.pulse()
+        assert robot.run().tolist() == [3.0, 4.0]
 
-            frontend.request("reset", seed=0, pose=[0.0, 0.0], timeout=WAIT)
+        fresh = arm.wait_for(11)
+        assert fresh.fresh
+        assert fresh.observed.tolist() == fresh.desired.tolist() == [3.0, 4.0]
+        assert fresh.extended.n == 5
+        assert batch.statuses == [o80.Status.PURGED]
+        assert batch.handles[0].reason == o80.Reason.FRESH_START
 
-            fresh = frontend.latest()
-            assert (fresh.fresh, fresh.iteration) == (True, 11)
-            assert fresh.observed.tolist() == fresh.desired.tolist() == [3.0, 4.0]
-            assert fresh.extended.n == 5
-            assert batch.statuses == [o80.Status.PURGED]
-            assert batch.handles[0].reason == o80.Reason.FRESH_START
-            assert frontend.burst(1, timeout=WAIT).desired.tolist() == [3.0, 4.0]
-
-            frontend.request("home", timeout=WAIT)
-
-            assert frontend.latest().desired.tolist() == [1.0, 2.0]
+        arm.add_request("home")
+        arm.pulse()
+        assert robot.run().tolist() == [1.0, 2.0]
 
 
 class UntellableError(ZeroDivisionError):
@@ -216,18 +179,21 @@ def test_a_handler_that_fails_ends_the_backend(
     def home(_: o80.Record) -> None:
         raise error
 
-    with o80.Backend(segment, ["a"], requests=REQUESTS, bursting=True) as backend:
+    with (
+        contextlib.suppress(ZeroDivisionError),
+        o80.Backend(segment, ["a"], requests=REQUESTS) as backend,
+    ):
         backend.on("home", home)
         backend.publish([0.0])
-        with running(backend) as raised, o80.Frontend(segment) as frontend:
-            with pytest.raises(o80.Error, match=told):
-                frontend.request("home", timeout=WAIT)
-            with pytest.raises(o80.BackendFailed, match=told):
-                frontend.wait_for(10**6, timeout=WAIT)
-            with pytest.raises(o80.BackendFailed, match=told):
-                o80.Frontend(segment, timeout=WAIT)
-
-    assert isinstance(raised[0], ZeroDivisionError)
+        arm = o80.Frontend(segment)
+        arm.add_request("home")
+        arm.pulse()
+        backend.step()
+        pytest.fail("the handler has not ended it")
+    for wait in (lambda: arm.wait_for(10**6, WAIT), lambda: o80.Frontend(segment, WAIT)):
+        with pytest.raises(o80.BackendFailed, match=told):
+            wait()
+    arm.close()
 
 
 def test_only_known_requests_have_handlers_and_only_actuators_are_interrupted(segment: str) -> None:

@@ -11,63 +11,9 @@ from pathlib import Path
 
 import pytest
 from processes import O80, WAIT, Running, run_o80, until
+from room_sensor import Silent
 
 import o80
-
-DRIVER = """
-#include <unistd.h>
-#include <array>
-#include <string>
-#include "o80/robot.hpp"
-
-class Hanging {
- public:
-  struct Config { std::string verb = "none"; };
-  using Actuators = std::array<double, 1>;
-  explicit Hanging(const Config& config) : verb_(config.verb) {}
-  void describe(o80::Schema& schema) const {
-    if (verb_ != "silent") return schema.simulated();
-    schema.actuator(0).limits({.speed = 2.0});
-  }
-  void start() { hang_in("start"); }
-  void write(const o80::Desired<Hanging>& desired) {
-    if (desired.iteration() == 20) hang_in("write");
-    if (verb_ == "late") usleep(5000);
-  }
-  void read(o80::Reading<Hanging>& reading) { reading.observed[0] = place_; }
-  void halt() { place_ = verb_ == "silent" ? 30.0 : 0.0; }
-  void stop() noexcept {}
-
- private:
-  void hang_in(const std::string& verb) const {
-    while (verb == verb_) pause();
-  }
-  std::string verb_;
-  double place_ = 0.0;
-};
-O80_DESCRIBE(Hanging::Config, verb);
-O80_ROBOT(hanging, Hanging)
-"""
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A robot library that hangs where it is told to; silent: it is none of a simulation."""
-    return compiled(tmp_path_factory.mktemp("hanging"), "hanging", DRIVER)
-
-
-def compiled(folder: Path, name: str, driver: str) -> Path:
-    """A robot library of this source."""
-    (folder / f"{name}.cpp").write_text(driver)
-    include = Path(o80.__file__).parent / "include"
-    compiler = (sysconfig.get_config_var("CXX") or "g++").split()[0]
-    subprocess.run(
-        [compiler, "-std=c++20", "-shared", "-fPIC", "-fvisibility=hidden", f"-I{include}",
-         f"{name}.cpp", "-o", f"{name}.so"],
-        cwd=folder,
-        check=True,
-    )  # fmt: skip
-    return folder / f"{name}.so"
 
 
 def line_with(text: str, process: Running) -> str:
@@ -82,11 +28,12 @@ Hang = Callable[[str], Running]
 
 
 @pytest.fixture
-def hang(library: Path, segment: str) -> Iterator[Hang]:
+def hang(segment: str) -> Iterator[Hang]:
     """Starts a robot that hangs in a verb."""
-    command = [O80, "run", library, "--segment", segment, "--verb"]
+    command = [O80, "run", "room_sensor:Hanging", "--segment", segment, "--verb"]
+    here = Path(__file__).parents[1]
     with contextlib.ExitStack() as started:
-        yield lambda verb: started.enter_context(Running(*command, verb))
+        yield lambda verb: started.enter_context(Running(*command, verb, cwd=here))
     o80.clean(segment)
 
 
@@ -129,10 +76,13 @@ def test_a_verb_that_does_not_return_is_listed_and_so_are_missing_rows(
 
 
 def test_a_library_with_an_undefined_function_is_told_its_name(tmp_path: Path) -> None:
-    library = compiled(
-        tmp_path,
-        "undefined",
-        'double torque(int joint);\nextern "C" double read() { return torque(1); }\n',
+    library = tmp_path / "undefined.so"
+    compiler = (sysconfig.get_config_var("CXX") or "g++").split()[0]
+    subprocess.run(
+        [compiler, "-shared", "-fPIC", "-xc++", "-", "-o", library],
+        input='double torque(int joint);\nextern "C" double read() { return torque(1); }\n',
+        text=True,
+        check=True,
     )
 
     with pytest.raises(o80.DriverError, match=r"'torque\(int\)', which is not defined"):
@@ -140,12 +90,9 @@ def test_a_library_with_an_undefined_function_is_told_its_name(tmp_path: Path) -
 
 
 # rule W8
-def test_a_robot_that_says_nothing_of_itself_is_guarded_as_hardware(
-    library: Path, segment: str
-) -> None:
+def test_a_robot_that_says_nothing_of_itself_is_guarded_as_hardware(segment: str) -> None:
     """In real time it is halted after a gap, and is not resumed where it cannot have come."""
-    robot = o80.robots.load(library)
-    with robot.start(segment, verb="silent") as process, process.frontend() as arm:
+    with o80.robots.load(Silent).start(segment) as process, process.frontend() as arm:
         arm.add_command(0, 0.5, iterations=10_000_000)
         batch = arm.pulse()
         arm.wait_for(3, timeout=WAIT)

@@ -112,26 +112,16 @@ def test_a_command_may_start_from_the_observed_state(arm: o80.Frontend) -> None:
 Wait = Callable[[o80.Frontend], object]
 
 
-def by_pulse_and_wait(arm: o80.Frontend) -> object:
-    return arm.pulse_and_wait(WAIT)
+async def awaited(arm: o80.Frontend) -> object:
+    return await arm.pulse()
 
 
-def by_batch(arm: o80.Frontend) -> None:
-    arm.pulse().wait(WAIT)
-
-
-def by_await(arm: o80.Frontend) -> object:
-    async def wait() -> object:
-        return await arm.pulse()
-
-    return asyncio.run(wait())
-
-
-def by_aio(arm: o80.Frontend) -> object:
-    return asyncio.run(arm.aio.pulse_and_wait(WAIT))
-
-
-WAITS = [by_pulse_and_wait, by_batch, by_await, by_aio]
+WAITS: list[Wait] = [
+    lambda arm: arm.pulse_and_wait(WAIT),
+    lambda arm: arm.pulse().wait(WAIT),
+    lambda arm: asyncio.run(awaited(arm)),
+    lambda arm: asyncio.run(arm.aio.pulse_and_wait(WAIT)),
+]
 
 
 def too_late(arm: o80.Frontend) -> None:

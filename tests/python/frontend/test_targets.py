@@ -41,20 +41,15 @@ def robot(segment: str) -> Iterator[ManualBackend]:
         yield made
 
 
-def test_a_mapping_leaves_missing_fields_as_they_were_desired(robot: ManualBackend) -> None:
-    robot.desired("a", {"position": 0.5, "count": 3})
-    joint = robot.desired("a", {"gains": [1, 2], "tool": {"size": 2.0}}).joints[0]
-
-    assert (joint["position"], joint["count"], joint["tool"]["size"]) == (0.5, 3, 2.0)
-    assert joint["gains"].tolist() == [1.0, 2.0]
-    assert robot.desired("a", {"tool": {"kind": "TORQUE"}}).joints[0]["tool"]["size"] == 2.0
-
-
 def test_a_record_is_a_target(robot: ManualBackend) -> None:
     robot.desired("a", {"position": 0.5, "gains": (3, 4), "on": True})
     record = robot.frontend.latest().observed.joints[0]
 
     assert robot.desired("b", record).joints[1] == record
+    robot.desired(["a", "b"], [0.0, 0.0])
+    robot.frontend.add_trajectory(np.full((3, 2), record), ["a", "b"])
+    robot.frontend.pulse()
+    assert (robot.run(3).joints == record).all()
 
 
 def test_a_first_field_that_is_no_number_takes_what_fits_it(segment: str) -> None:
@@ -73,6 +68,8 @@ def test_a_first_field_that_is_no_number_takes_what_fits_it(segment: str) -> Non
         *(("valve", on, True) for on in (True, np.True_, 1, 1.0)),
         *(("gear", seven, 7) for seven in (7, 7.0, np.float64(7), np.uint8(7), np.array(7))),
         *(("a", one, {"position": 1.0}) for one in (1, 1.0, np.float32(1), np.int8(1), True)),
+        ("a", {"gains": [1, 2]}, {"gains": [1.0, 2.0]}),
+        ("a", {"tool": {"kind": "TORQUE"}}, {"tool": (2.0, Control.TORQUE)}),
         ([np.int64(0), "valve"], [{"position": 0.8}, True], {"position": 0.8}),
         ("a", (0.5, np.array([1, 2]), 3, True, (1.0, 5)), {"position": 0.5, "on": True}),
     ],
@@ -81,15 +78,14 @@ def test_a_value_is_given_in_each_form_that_it_has(
     robot: ManualBackend, actuator: Any, target: object, desired: Any
 ) -> None:
     """Fields that a target does not name keep what was desired."""
-    before = {"gains": [3.0, 4.0], "count": 3}
-    robot.desired("a", before)
+    robot.desired("a", {"gains": [3.0, 4.0], "count": 3, "tool": {"size": 2.0}})
     row = robot.desired(actuator, target)
     if not isinstance(desired, dict):
         assert row[actuator] == desired
         return
-    kept = {} if isinstance(target, tuple) else before
-    joint = row.joints[0]
-    assert {name: joint[name].tolist() for name in desired | kept} == desired | kept
+    kept = {"gains": [3.0, 4.0], "count": 3, "tool": (2.0, 0)}
+    wanted = desired if isinstance(target, tuple) else kept | desired
+    assert {name: row.joints[0][name].tolist() for name in wanted} == wanted
 
 
 @pytest.mark.parametrize(
@@ -221,26 +217,6 @@ def test_a_trajectory_of_chosen_actuators(arm: o80.Frontend) -> None:
     arm.add_trajectory([[1.0, 2.0]], ["elbow", 0])
 
     assert arm.pulse_and_wait(timeout=WAIT).desired.tolist() == [2.0, 1.0]
-
-
-def test_a_trajectory_of_states_with_fields(robot: ManualBackend) -> None:
-    fields = {
-        "position": np.linspace(0, 1, 6).reshape(3, 2),
-        "gains": np.ones((3, 2, 2)),
-        "count": np.zeros((3, 2)),
-        "on": np.ones((3, 2), bool),
-    }
-    states = robot.frontend.latest().observed.joints
-    targets = np.zeros((3, 2), states.dtype)
-    for name, values in fields.items():
-        targets[name] = values
-
-    robot.frontend.add_trajectory(targets, ["a", "b"])
-    robot.frontend.pulse()
-    last = robot.run(3)
-
-    assert last.joints["position"].tolist() == [0.8, 1.0]
-    assert last.joints["gains"].tolist() == [[1.0, 1.0], [1.0, 1.0]]
 
 
 @pytest.mark.parametrize("single", [False, True])

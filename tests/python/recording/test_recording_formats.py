@@ -76,42 +76,6 @@ def test_a_recording_of_an_earlier_version_holds_fields_of_each_kind() -> None:
 
 
 @pytest.mark.parametrize("name", JOURNALS)
-def test_the_recordings_hold_what_a_journal_can_tell(name: str) -> None:
-    """Except what only a race or damage brings about: the tests of the codec have that."""
-    (bench,) = o80.open(RECORDINGS / f"{name}.mcap")["bench"].epochs
-    entries = bench.journal()
-    for epoch in o80.open(RECORDINGS / f"{name}.mcap")["joints"].epochs:
-        entries += epoch.journal()
-    commands = [command for entry in entries for command in entry.commands]
-
-    assert {entry.kind for entry in entries} == {
-        *("taken", "scheduled", "rejected", "status", "halt", "resume", "control_taken"),
-        *("control_released", "control_lost", "burst", "burst_ended", "died", "silent"),
-        *("interrupted", "fresh_start", "ended", "snapshot", "chunk_begun"),
-    }
-    assert {command.kind for command in commands} == {
-        *("command", "purge", "request", "take_control", "release_control", "resume"),
-        "close_plan",
-    }
-    assert {command.pace for command in commands} - {""} == {
-        *("direct", "duration", "speed", "until", "iterations", "fastest", "chunk")
-    }
-    assert {command.profile for command in commands} - {""} == {
-        *("linear", "minimum_jerk", "monotone", "smooth")
-    }
-    assert {command.mode for command in commands} - {""} == {"queue", "overwrite"}
-    assert {command.start for command in commands} - {""} == {"desired", "observed"}
-    assert {command.only_own for command in commands} == {False, True}
-    assert any(command.times for command in commands)
-    assert any(len(command.actuators) > 1 for command in commands)
-    assert {entry.status for entry in entries} - {None} == {
-        *("active", "completed", "overwritten", "purged", "interrupted"),
-        *("rejected", "halted"),
-    }
-    assert "unknown" not in {command.kind for command in commands}
-
-
-@pytest.mark.parametrize("name", JOURNALS)
 def test_a_recording_of_an_earlier_version_is_played(name: str, segment: str) -> None:
     path, prefix = RECORDINGS / f"{name}.mcap", f"{segment}-"
     (*_, run) = o80.open(path)["joints"].epochs
