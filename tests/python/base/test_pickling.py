@@ -5,24 +5,10 @@ import multiprocessing
 import pickle
 from typing import Any
 
-import numpy as np
 import pytest
 from processes import WAIT
 
 import o80
-
-
-@pytest.fixture
-def mixed(segment: str) -> Any:
-    """A frontend of a robot with groups, an enum and sensors."""
-    with o80.Backend(
-        segment,
-        {"joints": ({"position": float, "turns": np.int32}, 2), "gripper": bool},
-        extended={"force": (np.float32, (3,))},
-    ) as backend:
-        backend.publish({"joints": [(0.5, 1), (0.25, 2)], "gripper": True}, {"force": [1, 2, 3]})
-        with o80.Frontend(segment) as frontend:
-            yield frontend
 
 
 def content(observation: Any) -> bytes:
@@ -34,19 +20,16 @@ def same(one: o80.Observation, other: o80.Observation) -> bool:
 
 
 @pytest.mark.parametrize("protocol", range(2, pickle.HIGHEST_PROTOCOL + 1))
-def test_observations_and_histories_are_data(mixed: o80.Frontend, protocol: int) -> None:
-    observation, history = pickle.loads(
-        pickle.dumps((mixed.latest(), mixed.history()), protocol=protocol)
-    )
+def test_observations_and_histories_are_data(arm: o80.Frontend, protocol: int) -> None:
+    """Rows of every layout are in rows/test_row_layouts.py."""
+    row = arm.burst(3)
+    observation, history = pickle.loads(pickle.dumps((row, arm.history()), protocol=protocol))
 
-    assert same(observation, mixed.latest())
-    assert observation.observed.joints["position"].tolist() == [0.5, 0.25]
-    assert observation.extended.force.tolist() == [1, 2, 3]
+    assert same(observation, row)
+    assert observation.extended.effort.tolist() == row.extended.effort.tolist()
     assert isinstance(history, o80.History)
-    assert history.observed.gripper.tolist() == [True]
-    assert history[0].observed == observation.observed
-    assert pickle.loads(pickle.dumps(observation.observed)) == observation.observed
-    assert same(copy.deepcopy(observation), observation)
+    assert same(history[-1], row)
+    assert same(copy.deepcopy(observation), row)
 
 
 def test_many_observations_are_pickled_with_one_description(arm: o80.Frontend) -> None:

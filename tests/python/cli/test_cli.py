@@ -57,13 +57,13 @@ def test_a_running_robot_is_listed(tmp_path: Path, robot: Running) -> None:
     assert row["halted"] == ""
 
 
-def test_a_watched_list_leaves_the_terminal_as_it_was(tmp_path: Path, robot: Running) -> None:
+def test_a_watched_list_fits_a_terminal_of_80_columns_and_leaves_it_as_it_was(
+    tmp_path: Path, robot: Running
+) -> None:
+    terminal = {"O80_DIRECTORY": str(tmp_path), "COLUMNS": "80", "NO_COLOR": "1", "TERM": "xterm"}
     ours, theirs = pty.openpty()
     watching = subprocess.Popen(
-        [O80, "list", "--watch"],
-        stdout=theirs,
-        stderr=theirs,
-        env={**os.environ, "O80_DIRECTORY": str(tmp_path)},
+        [O80, "list", "--watch"], stdout=theirs, stderr=theirs, env=os.environ | terminal
     )
     os.close(theirs)
     seen = ""
@@ -77,7 +77,9 @@ def test_a_watched_list_leaves_the_terminal_as_it_was(tmp_path: Path, robot: Run
     os.close(ours)
     assert seen.startswith("\033[?1049h")
     assert seen.rstrip().endswith("\033[?1049l\033[?25h")
-    assert "two_joints" in seen
+    table = [line for line in seen.splitlines() if not line.startswith("two_joints:")]
+    assert "two_joints" in "".join(table)
+    assert max(map(len, table)) <= 80
 
 
 def test_info_describes_a_robot(tmp_path: Path, robot: Running) -> None:

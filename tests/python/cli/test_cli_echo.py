@@ -2,8 +2,6 @@
 
 import json
 import os
-import pty
-import subprocess
 import time
 from collections.abc import Iterator
 from enum import IntEnum
@@ -122,29 +120,6 @@ def test_echo_says_that_a_backend_waits_for_a_burst(segment: str) -> None:
         printed, _ = watching.communicate(timeout=WAIT)
     assert watching.returncode == 0
     assert len(printed.splitlines()) == 2
-
-
-def test_a_table_fits_a_terminal_of_80_columns(segment: str, backend: o80.Backend) -> None:
-    parent, child = pty.openpty()
-    subprocess.run(
-        [O80, "list"],
-        stdout=child,
-        check=True,
-        timeout=WAIT,
-        env={**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "TERM": "xterm"},
-    )
-    os.close(child)
-    printed = b""
-    try:
-        while part := os.read(parent, 4096):
-            printed += part
-    except OSError:  # the other end is closed
-        pass
-    os.close(parent)
-    table = [line for line in printed.decode().splitlines() if not line.startswith(segment + ":")]
-    assert segment in printed.decode()
-    assert "rate" in table[0]
-    assert max(map(len, table)) <= 80
 
 
 def test_commands_are_shown_with_their_sender_their_begin_and_their_end(

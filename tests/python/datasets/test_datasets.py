@@ -2,6 +2,7 @@
 
 import json
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -13,6 +14,7 @@ from processes import run_o80
 from room_sensor import Obedient
 
 import o80
+from o80.cli.export import export
 from o80.datasets import lerobot, minari
 from o80.datasets.episodes import Episodes, episodes_of
 
@@ -321,9 +323,9 @@ def test_a_data_set_has_what_was_asked_for_and_what_acted(segment: str, tmp_path
 
 
 def test_numbers_and_units_of_a_lerobot_data_set_are_chosen(recorded: Path, tmp_path: Path) -> None:
-    options = ("-o", tmp_path / "set", "--format", "lerobot", "--every", "10")
-    words = ("--state", "elbow", "--units", "degrees", "--sensors", "observed.shoulder,effort[1]")
-    run_o80("export", recorded, *options, *words)
+    write = partial(export, str(recorded), form="lerobot", every="10")
+    sensors = "observed.shoulder,effort[1]"
+    write(tmp_path / "set", state="elbow", units="degrees", sensors=sensors)
     features = json.loads((tmp_path / "set/meta/info.json").read_text())["features"]
     assert features["observation.state"]["names"] == ["elbow.pos"]
     assert features["action"]["names"] == ["shoulder.pos", "elbow.pos"]
@@ -332,19 +334,19 @@ def test_numbers_and_units_of_a_lerobot_data_set_are_chosen(recorded: Path, tmp_
     rows = np.concatenate([each.observed[:-1, 1] for each in episodes(recorded, every=10).all])
     state = np.ravel(table["observation.state"].to_pylist())
     assert state == pytest.approx(np.degrees(rows), abs=1e-4)
-    run_o80("export", recorded, "-o", tmp_path / "plain", *options[2:])
+    write(tmp_path / "plain")
     plain = json.loads((tmp_path / "plain/meta/info.json").read_text())["features"]
     assert "observation.environment_state" not in plain
-    for refused, why in (
-        (("--units", "normalised"), "no calibrated ranges"),
-        (("--units", "turns"), "must be one of degrees, normalised, native"),
-        (("--action", "elbo"), "Did you mean 'elbow'"),
-        (("--fields", "effort"), "--sensors"),
-    ):
-        said = run_o80("export", recorded, "-o", tmp_path / "no", *options[2:], *refused, code=1)
-        assert why in said.stderr
-    said = run_o80("export", recorded, "-o", tmp_path / "no.npz", "--units", "degrees", code=1)
-    assert "--format lerobot" in said.stderr
+    refused: list[tuple[dict[str, Any], str]] = [
+        ({"units": "normalised"}, "no calibrated ranges"),
+        ({"units": "turns"}, "must be one of degrees, normalised, native"),
+        ({"action": "elbo"}, "Did you mean 'elbow'"),
+        ({"fields": "effort"}, "--sensors"),
+        ({"form": None, "every": "1", "units": "degrees"}, "--format lerobot"),
+    ]
+    for options, why in refused:
+        with pytest.raises(o80.InvalidArgument, match=why):
+            write(tmp_path / "no", **options)
 
 
 def test_times_are_k_over_fps_and_the_true_ones_beside_them(segment: str, tmp_path: Path) -> None:

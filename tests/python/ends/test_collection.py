@@ -83,7 +83,7 @@ def inline(segment: str) -> None:
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 @pytest.mark.parametrize(
     ("use", "times"),
-    [(command, 1000), (drop_all, 60), (fail_half_way, 60), (own_backend, 100), (inline, 15)],
+    [(command, 1000), (drop_all, 60), (fail_half_way, 15), (own_backend, 100), (inline, 15)],
 )
 def test_many_of_them_leave_nothing(
     standing: o80.Backend, use: Callable[[str], None], times: int

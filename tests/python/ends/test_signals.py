@@ -177,15 +177,14 @@ def alarm_in(seconds: float) -> Iterator[None]:
 
 
 def test_a_handler_that_returns_lets_the_wait_go_on_with_its_timeout(arm: o80.Frontend) -> None:
-    heard: list[float] = []
-    begun = time.monotonic()
-    with handling(signal.SIGALRM, lambda *_: heard.append(time.monotonic())):
+    heard: list[int] = []
+    with handling(signal.SIGALRM, lambda number, _: heard.append(number)):
         signal.setitimer(signal.ITIMER_REAL, 0.02, 0.02)
-        with pytest.raises(o80.TimeoutError):
-            arm.wait_for(10, timeout=0.4)
-
-    assert len(heard) >= 3  # one a slice at least, and the wait was not begun anew by any
-    assert time.monotonic() - begun >= 0.4
+        while len(heard) < 3:  # a busy machine may deliver few in the time of a wait
+            begun = time.monotonic()
+            with pytest.raises(o80.TimeoutError):  # no signal begins the wait anew
+                arm.wait_for(10, timeout=0.4)
+            assert time.monotonic() - begun >= 0.4
 
 
 def test_a_handler_that_raises_ends_the_wait_with_that(process: o80.robots.Process) -> None:

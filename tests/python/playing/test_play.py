@@ -46,7 +46,7 @@ def test_a_script_reads_a_robot_and_its_recording_alike(real_time: Path, segment
     expected = rows_of(real_time, segment).iteration.tolist()
     found: list[list[int]] = []
     reader = threading.Thread(target=lambda: found.append(read_to_the_end(segment)))
-    with o80.play(real_time, history=1000) as playback:
+    with o80.play(real_time) as playback:
         reader.start()
         assert playback.wait(WAIT)
         reader.join(WAIT)

@@ -154,6 +154,7 @@ def test_chunks_grow_to_a_quarter_of_what_the_robot_holds(segment: str, tmp_path
         assert recorder.is_due(), "in the first seconds chunks are short"
         recorder._begun -= 60.0
         recorder.catch_up()
+        recorder._polled = math.inf  # the time since then is no reason
         assert not recorder.is_due()
         arm.burst(200)
         assert not recorder.is_due()
@@ -174,7 +175,7 @@ def test_a_chunk_is_due_when_the_journal_fills(segment: str, tmp_path: Path) -> 
         arm.burst(20_000)
         recorder._begun -= 60.0
         recorder.catch_up()
-        recorder._polled = math.inf  # the time since then is no reason either
+        recorder._polled = math.inf
         commands = 0
         while not recorder.is_due() and commands < 4000:  # before the rows are a reason
             arm.add_command("elbow", 0.1)
