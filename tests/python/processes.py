@@ -36,6 +36,12 @@ def run_python(*words: object, **options: Any) -> "subprocess.CompletedProcess[s
     return run_program(sys.executable, *words, **options)
 
 
+def may_use_fifo() -> bool:
+    """Whether this user may give processes real-time priorities."""
+    tries = "import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))"
+    return run_python("-c", tries, code=None).returncode == 0
+
+
 def run_o80(*words: object, **options: Any) -> "subprocess.CompletedProcess[str]":
     """Runs the program o80; see run_program()."""
     done = run_program(O80, *words, **options)

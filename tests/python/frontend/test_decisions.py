@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from manual_backend import ManualBackend
 from processes import run_o80
 
 import o80
@@ -205,16 +206,13 @@ def test_after_a_reattach_rows_are_of_the_new_run(segment: str) -> None:
 def test_a_device_s_row_counts_from_its_capture(segment: str) -> None:
     sensor = {"capture_time": np.int64, "x": np.float64}
     with (
-        o80.Backend(segment, ["a"], frequency=100.0) as robot,
-        o80.Backend(f"{segment}-camera", 0, extended=sensor, frequency=100.0) as camera,
+        ManualBackend(segment, ["a"]) as robot,
+        o80.Backend(f"{segment}-camera", 0, extended=sensor) as camera,
     ):
-        robot.publish()
         camera.publish()
-        arm, eye = o80.Frontend(segment), o80.Frontend(f"{segment}-camera")
+        arm, eye = robot.frontend, o80.Frontend(f"{segment}-camera")
         captured = arm.latest().time
-        for _ in range(4):
-            robot.step()
-            robot.publish()
+        robot.run(4)
 
         def decided(capture_time: int) -> o80.Batch:
             camera.step()
@@ -223,8 +221,7 @@ def test_a_device_s_row_counts_from_its_capture(segment: str) -> None:
             return arm.pulse(seen=eye.latest())
 
         known, nothing = decided(captured), decided(0)
-        robot.step()
-        robot.publish()
+        robot.run()
         joined = o80.align({"arm": arm, "camera": eye}, by="seen")["camera"]
         assert joined.iteration[-1] == 2  # the newest batch; that row captured nothing
         assert np.isnan(joined.age).all()
@@ -235,5 +232,4 @@ def test_a_device_s_row_counts_from_its_capture(segment: str) -> None:
         assert nothing.decision_latency is not None
         assert nothing.decision_latency.iterations is None
         assert nothing.decision_latency.seconds is None
-        arm.close()
         eye.close()

@@ -28,22 +28,32 @@ Captures = list[int]
 Search = Callable[[Captures, int], int | None]
 
 
-def device(name: str, captures: Captures) -> o80.History:
-    """Rows of a device that captured at these times [ns]; 0: it captured nothing."""
-    with o80.Backend(name, 0, extended=EXTENDED, history=64, lanes=1, lane_blocks=64) as backend:
-        for number, time in enumerate(captures):
+def published(name: str, extended: dict[str, Any], rows: list[dict[str, Any]]) -> o80.History:
+    """Rows of a device with these sensor values."""
+    with o80.Backend(
+        name, 0, extended=extended, history=len(rows), lanes=1, lane_blocks=64
+    ) as backend:
+        for number, row in enumerate(rows):
             if number:
                 backend.step()
-            values = {
-                "capture_time": time,
-                "position": [number, 2.0 * number, -1.0],
-                "speed": 0.5 * number,
-                "count": number,
-                "seen": True,
-            }
-            backend.publish(None, values)
+            backend.publish(None, row)
         with o80.Frontend(name) as reader:
             return reader.history()
+
+
+def device(name: str, captures: Captures) -> o80.History:
+    """Rows of a device that captured at these times [ns]; 0: it captured nothing."""
+    rows = [
+        {
+            "capture_time": time,
+            "position": [number, 2.0 * number, -1.0],
+            "speed": 0.5 * number,
+            "count": number,
+            "seen": True,
+        }
+        for number, time in enumerate(captures)
+    ]
+    return published(name, EXTENDED, rows)
 
 
 def nearest_row(captures: Captures, time: int) -> int | None:
@@ -285,17 +295,14 @@ def test_rows_by_which_nothing_was_commanded_are_no_partners(arm: o80.Frontend) 
 PERIOD = 2_000_000  # [ns]
 
 
-def signal(name: str, values: np.ndarray, *, first: int = 0, period: int = PERIOD) -> o80.History:
+def signal(name: str, values: np.ndarray) -> o80.History:
     """Rows with a value each, captured at a fixed rate."""
     extended = {"capture_time": np.int64, "value": np.float64, "pair": (np.float64, 2)}
-    with o80.Backend(name, 0, extended=extended, history=len(values), lanes=1) as backend:
-        for number, value in enumerate(values):
-            if number:
-                backend.step()
-            time = 1 + first + number * period
-            backend.publish(None, {"capture_time": time, "value": value, "pair": [value, 0]})
-        with o80.Frontend(name) as reader:
-            return reader.history()
+    rows = [
+        {"capture_time": 1 + number * PERIOD, "value": value, "pair": [value, 0]}
+        for number, value in enumerate(values)
+    ]
+    return published(name, extended, rows)
 
 
 def motion(rng: np.random.Generator) -> Callable[[Any], Any]:
@@ -352,14 +359,12 @@ def test_stated_errors_of_capture_times_are_in_the_uncertainty(segment: str) -> 
     f, t = motion(np.random.default_rng(4)), np.arange(2000) * PERIOD * 1e-9
     one = signal(segment, f(t)), "extended.value"
     extended = {"capture_time": np.int64, "capture_error": np.int64, "value": np.float64}
-    with o80.Backend(segment, 0, extended=extended, history=2000, lanes=1) as backend:
-        for number, value in enumerate(f(t - 0.01)):
-            if number:
-                backend.step()
-            row = {"capture_time": 1 + number * PERIOD, "capture_error": 3_000_000, "value": value}
-            backend.publish(None, row)
-        with o80.Frontend(segment) as reader:
-            found = o80.latency(one, (reader.history(), "extended.value"), most=0.2)
+    rows = [
+        {"capture_time": 1 + number * PERIOD, "capture_error": 3_000_000, "value": value}
+        for number, value in enumerate(f(t - 0.01))
+    ]
+    other = published(segment, extended, rows), "extended.value"
+    found = o80.latency(one, other, most=0.2)
     assert found.uncertainty == pytest.approx(0.003, rel=0.01)
     assert found.seconds == pytest.approx(0.01, abs=1e-5)
 

@@ -10,14 +10,13 @@ import shutil
 import signal
 import socket
 import struct
-import subprocess
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Self
 
 import pytest
-from processes import O80, WAIT, Running
+from processes import O80, WAIT, Running, may_use_fifo
 
 import o80
 
@@ -180,21 +179,8 @@ def said_by(process: Running) -> list[str]:
     return [line for line in text.splitlines() if "priority" in line]
 
 
-def may_grant() -> bool:
-    """Whether this process may give real-time priorities to others."""
-    child = subprocess.Popen(["sleep", "60"])
-    try:
-        os.sched_setscheduler(child.pid, GRANTED, os.sched_param(20))
-    except OSError:
-        return False
-    finally:
-        child.kill()
-        child.wait()
-    return True
-
-
 def test_realtime_kit_grants_what_limits_refuse(segment: str, run: Run) -> None:
-    if not may_grant():
+    if not may_use_fifo():
         pytest.skip("this user may give no real-time priorities")
     with RealtimeKit() as kit:
         process = run("two_joints", "--policy", "fifo", bus=kit.address)
@@ -209,7 +195,7 @@ def test_realtime_kit_grants_what_limits_refuse(segment: str, run: Run) -> None:
 
 
 def test_a_loop_that_does_not_sleep_loses_the_priority_and_goes_on(segment: str, run: Run) -> None:
-    if not may_grant():
+    if not may_use_fifo():
         pytest.skip("this user may give no real-time priorities")
     with RealtimeKit() as kit:
         process = run("room_sensor:Spins", "--policy", "rr", "--priority", "7", bus=kit.address)

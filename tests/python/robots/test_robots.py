@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from processes import WAIT, run_python
+from processes import WAIT, may_use_fifo, run_python
 
 import o80
 
@@ -226,15 +226,10 @@ print(policies)
 """
 
 
-def is_fifo_allowed() -> bool:
-    tries = "import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))"
-    return run_python("-c", tries, code=None).returncode == 0
-
-
 def test_a_controller_that_does_not_sleep_becomes_an_ordinary_thread_and_no_other(
     segment: str,
 ) -> None:
-    if not is_fifo_allowed():
+    if not may_use_fifo():
         pytest.skip("this user may not use the policy fifo")
     ran = run_python("-c", TWO_CONTROLLERS, segment)
     assert ast.literal_eval(ran.stdout) == {

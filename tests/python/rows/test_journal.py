@@ -32,21 +32,6 @@ def test_targets_have_the_fields_that_were_given(segment: str) -> None:
     assert target["enabled"] is True
 
 
-def test_a_trajectory_has_all_its_rows(segment: str) -> None:
-    rows = np.linspace([0.0, 1.0], [1.0, 0.0], 20)
-    with ManualBackend(segment, ["a", "b"]) as robot:
-        robot.frontend.add_trajectory(rows, iterations=2)
-        robot.frontend.pulse()
-        robot.run()
-        commands = of_kind(robot.frontend.journal(), "taken")[0].commands
-    targets = {
-        name: target
-        for command in commands
-        for name, target in zip(command.actuators, command.targets, strict=True)
-    }
-    assert np.array_equal(np.stack([targets["a"], targets["b"]], axis=1), rows)
-
-
 def test_goes_on_behind_the_entries_that_were_read(segment: str) -> None:
     with ManualBackend(segment, ["a"]) as robot:
         journal, new = Journal(robot.frontend), Journal(robot.frontend, new=True)
