@@ -1,13 +1,10 @@
-"""A recorded run with a flipped bit, and the command `o80 replay`."""
+"""A recorded run with a flipped bit."""
 
-import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from processes import run_o80
-
 import o80
 from o80.replaying.recorded_run import FileRun
 
@@ -33,7 +30,3 @@ class Flipped:
             if 0 <= place < len(block):
                 raw[place * block.rows.itemsize + self.byte] ^= self.bit
             yield o80.History(block._decoder, np.frombuffer(bytes(raw), block.rows.dtype))
-
-
-def o80_replay(*words: str) -> subprocess.CompletedProcess[str]:
-    return run_o80("replay", *words, code=None)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from enum import IntEnum
 
 import pytest
+from manual_backend import ManualBackend
 from processes import O80, WAIT, Running, run_o80
 
 import o80
@@ -20,15 +21,12 @@ class Gear(IntEnum):
 
 
 @pytest.fixture
-def backend(segment: str) -> Iterator[o80.Backend]:
+def robot(segment: str) -> Iterator[ManualBackend]:
     """Two joints and a gear box, iterated by hand."""
-    with o80.Backend(
-        segment,
-        actuators=["shoulder", "elbow"],
-        extended={"gear": Gear, "force": "f8"},
-        bursting=False,
-    ) as made:
-        made.publish([0.0, 0.5], {"gear": Gear.FORWARD, "force": 1.5})
+    sensors = {"gear": Gear, "force": "f8"}
+    with ManualBackend(segment, ["shoulder", "elbow"], extended=sensors) as made:
+        made.backend.step()
+        made.backend.publish([0.0, 0.5], {"gear": Gear.FORWARD, "force": 1.5})
         yield made
 
 
@@ -38,24 +36,21 @@ def echo(segment: str, *words: str, fails: bool = False) -> str:
     return done.stderr if fails else done.stdout
 
 
-def test_an_enumeration_is_shown_by_name(segment: str, backend: o80.Backend) -> None:
+def test_an_enumeration_is_shown_by_name(segment: str, robot: ManualBackend) -> None:
     assert "gear FORWARD force 1.5" in echo(segment, "--count", "1")
     row = json.loads(echo(segment, "--count", "1", "--json"))
     assert row["extended"] == {"gear": "FORWARD", "force": 1.5}
 
 
-def test_the_actuators_that_commands_drive_are_named(segment: str, backend: o80.Backend) -> None:
+def test_the_actuators_that_commands_drive_are_named(segment: str, robot: ManualBackend) -> None:
     assert echo(segment, "--count", "1").rstrip().endswith("idle")
-    with o80.Frontend(segment) as frontend:
-        frontend.add_command("elbow", 1.0, iterations=1000)
-        frontend.pulse()
-        assert backend.step() is not None
-        backend.publish([0.0, 0.5], {"gear": Gear.NEUTRAL, "force": 0.0})
-
-        assert echo(segment, "--count", "1").rstrip().endswith("driven elbow")
+    robot.frontend.add_command("elbow", 1.0, iterations=1000)
+    robot.frontend.pulse()
+    robot.run()
+    assert echo(segment, "--count", "1").rstrip().endswith("driven elbow")
 
 
-def test_fields_are_chosen_by_path(segment: str, backend: o80.Backend) -> None:
+def test_fields_are_chosen_by_path(segment: str, robot: ManualBackend) -> None:
     chosen = json.loads(
         echo(segment, "--count", "1", "--json", "--fields", "observed.elbow,extended.gear,halted")
     )
@@ -73,7 +68,7 @@ def test_fields_are_chosen_by_path(segment: str, backend: o80.Backend) -> None:
     ],
 )
 def test_a_field_that_is_not_there_is_answered_with_the_nearest(
-    segment: str, backend: o80.Backend, path: str, said: str
+    segment: str, robot: ManualBackend, path: str, said: str
 ) -> None:
     assert said in echo(segment, "--fields", path, fails=True)
 
@@ -123,26 +118,21 @@ def test_echo_says_that_a_backend_waits_for_a_burst(segment: str) -> None:
 
 
 def test_commands_are_shown_with_their_sender_their_begin_and_their_end(
-    segment: str, backend: o80.Backend
+    segment: str, robot: ManualBackend
 ) -> None:
-    with o80.Frontend(segment) as frontend:
-        frontend.add_command("elbow", 1.25, iterations=2)
-        frontend.add_purge("shoulder")
-        frontend.pulse()
-        for _ in range(3):
-            backend.step()
-            backend.publish([0.0, 0.5], {"gear": Gear.NEUTRAL, "force": 0.0})
-        frontend.halt("enough")
-        backend.step()
-        backend.publish([0.0, 0.5], {"gear": Gear.NEUTRAL, "force": 0.0})
-        frontend.add_command("elbow", 2.0)
-        frontend.pulse()
-        backend.step()
-        lines = echo(segment, "--commands", "--count", "6").splitlines()
-        entries = [
-            json.loads(line)
-            for line in echo(segment, "--commands", "--count", "6", "--json").splitlines()
-        ]
+    frontend = robot.frontend
+    frontend.add_command("elbow", 1.25, iterations=2)
+    frontend.add_purge("shoulder")
+    frontend.pulse()
+    robot.run(3)
+    frontend.halt("enough")
+    robot.run()
+    frontend.add_command("elbow", 2.0)
+    frontend.pulse()
+    robot.run()
+    lines = echo(segment, "--commands", "--count", "6").splitlines()
+    told = echo(segment, "--commands", "--count", "6", "--json").splitlines()
+    entries = [json.loads(line) for line in told]
     sender = f"pid {os.getpid()}"
     assert sender in lines[0]
     assert "elbow to 1.25 in 2 iterations; purge shoulder" in lines[0]
@@ -166,19 +156,16 @@ def test_commands_are_shown_with_their_sender_their_begin_and_their_end(
 
 
 def test_commands_that_come_later_are_shown_when_they_come(
-    segment: str, backend: o80.Backend
+    segment: str, robot: ManualBackend
 ) -> None:
-    with (
-        Running(O80, "echo", segment, "--commands", "--count", "1") as echoing,
-        o80.Frontend(segment) as frontend,
-    ):
-        frontend.add_command("elbow", -0.5, duration=0.5)
-        frontend.pulse()
-        backend.step()
+    with Running(O80, "echo", segment, "--commands", "--count", "1") as echoing:
+        robot.frontend.add_command("elbow", -0.5, duration=0.5)
+        robot.frontend.pulse()
+        robot.run()
         out, _ = echoing.communicate(timeout=WAIT)
     assert "elbow to -0.5 in 0.5 s" in out
 
 
-def test_without_commands_a_timeout_says_so(segment: str, backend: o80.Backend) -> None:
+def test_without_commands_a_timeout_says_so(segment: str, robot: ManualBackend) -> None:
     said = echo(segment, "--commands", "--timeout", "0.2", fails=True)
     assert f"'{segment}' decided nothing for 0.2 s" in said

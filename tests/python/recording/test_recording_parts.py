@@ -190,10 +190,9 @@ def test_robots_keep_their_distances_if_the_wall_clock_is_set_between_their_star
     known: Any = o80.Frontend.provenance
 
     def stepped(frontend: o80.Frontend) -> o80.Provenance:
-        told = known.fget(frontend)
-        return replace(
-            told, wall_clock_offset=told.wall_clock_offset + HOUR * names.index(frontend.segment)
-        )
+        told: o80.Provenance = known.fget(frontend)
+        later = HOUR * names.index(frontend.segment)
+        return replace(told, wall_clock_offset=told.wall_clock_offset + later)
 
     monkeypatch.setattr(o80.Frontend, "provenance", property(stepped))
     with ExitStack() as stack:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flipped import Flipped, o80_replay
+from flipped import Flipped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mixed_robots import recorded
@@ -117,7 +117,7 @@ def test_a_history_without_row_0_is_not_replayed(segment: str) -> None:
     with o80.robots.load("two_joints").inline(segment, history=20) as arm:
         arm.burst(50)
         report = o80.replay(arm)
-        assert o80_replay(segment).returncode == 2
+        run_o80("replay", segment, code=2)
     assert not report.identical
     assert report.difference is None
     assert "the first recorded row is row 31: a replay begins at row 0" in str(report)
@@ -282,21 +282,16 @@ def test_another_machine_is_noted(run_in_file: FileRun) -> None:
 
 def test_the_command_says_whether_a_recording_repeats(arm: o80.Frontend, tmp_path: Path) -> None:
     path = file_of(tmp_path / "run.mcap", arm)
-    done = o80_replay(str(path))
-    assert (done.returncode, done.stderr) == (0, "")
+    done = run_o80("replay", path)
+    assert done.stderr == ""
     assert f"{arm.segment}: {arm.published + 1} rows, identical" in done.stdout
-
-    done = o80_replay(str(path), "--set", "gain=21")
-    assert done.returncode == 1
-    assert "observed." in done.stdout
-
+    assert "observed." in run_o80("replay", path, "--set", "gain=21", code=1).stdout
     for words, said in (
         (("--set", "gain"), "NAME=VALUE"),
         (("--set", "gian=2"), "'gian'"),
         (("--robot", "./nowhere.so"), "nowhere.so"),
     ):
-        done = o80_replay(str(path), *words)
-        assert (done.returncode, said in done.stderr) == (2, True), done.stderr
+        assert said in run_o80("replay", path, *words, code=2).stderr
 
 
 @pytest.mark.filterwarnings("ignore:no snapshot is recorded:RuntimeWarning")  # it often moves

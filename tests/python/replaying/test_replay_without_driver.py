@@ -8,7 +8,8 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pytest
-from flipped import Flipped, o80_replay
+from flipped import Flipped
+from processes import run_o80
 
 import o80
 from o80.drivers import Desired, Reading
@@ -119,14 +120,11 @@ def test_a_recording_that_begins_late_is_replayed_from_where_nothing_acts(
     assert (run.difference, run.gap) == (None, "")
     assert not run.identical
     assert run.rows > 60
-    done = o80_replay(str(path))
-    assert "--without-driver" in done.stdout, done.stdout
-    done = o80_replay(str(path), "--without-driver")
-    assert (done.returncode, "; rows before 2" in done.stdout) == (2, True), done.stdout
-    begin = str(run.first)
-    assert o80_replay(str(path), "--without-driver", "--since", begin).returncode == 0
-    done = o80_replay(str(path), "--without-driver", "--since", begin, "--set", "gain=2")
-    assert (done.returncode, "not used" in done.stdout) == (2, True), done.stdout
+    assert "--without-driver" in run_o80("replay", path, code=2).stdout
+    words = ("replay", path, "--without-driver")
+    assert "; rows before 2" in run_o80(*words, code=2).stdout
+    run_o80(*words, "--since", run.first)
+    assert "not used" in run_o80(*words, "--since", run.first, "--set", "gain=2", code=2).stdout
 
 
 @pytest.fixture(scope="module")
@@ -188,8 +186,8 @@ def test_it_begins_at_a_fresh_start(recorded: Path) -> None:
 
 
 def test_the_command_says_what_was_compared(recorded: Path) -> None:
-    done = o80_replay(str(recorded))
-    assert (done.returncode, done.stderr) == (0, "")
+    done = run_o80("replay", recorded)
+    assert done.stderr == ""
     assert "compared: desired states" in done.stdout
     assert "does not declare that it is simulated" in done.stdout
 
