@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
 import o80
 from o80.replaying.recorded_run import FileRun
 
