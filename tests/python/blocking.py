@@ -116,7 +116,7 @@ class Place:
     `name` is the prefix of the segments. The sources above use the attributes' names.
     """
 
-    def __init__(self, name: str, folder: Path, lanes: int = 32) -> None:
+    def __init__(self, name: str, folder: Path) -> None:
         self._stack = contextlib.ExitStack()
         joints = o80.robots.load("two_joints")
         self.late = f"{name}-late"
@@ -124,11 +124,11 @@ class Place:
         self.never = str(folder / "never.so")
         os.mkfifo(self.never)
         self.silent_backend = self._enter(
-            o80.Backend(f"{name}-silent", ["a", "b"], requests={"home": None}, lanes=lanes)
+            o80.Backend(f"{name}-silent", ["a", "b"], requests={"home": None}, lanes=32)
         )
         self.silent_backend.on("home", lambda _fields: None)
         self.standing_backend = self._enter(
-            o80.Backend(f"{name}-standing", ["a", "b"], bursting=True, lanes=lanes)
+            o80.Backend(f"{name}-standing", ["a", "b"], bursting=True, lanes=32)
         )
         self.stepping = self._enter(o80.Backend(f"{name}-stepping", ["a"], bursting=True))
         for backend in (self.silent_backend, self.standing_backend, self.stepping):

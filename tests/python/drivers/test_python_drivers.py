@@ -489,29 +489,28 @@ def test_rates_of_desired_states_sum_to_the_states(segment: str) -> None:
         assert robot.burst(300).desired["angle"].tolist() == [-0.1, 1.0]
 
 
-class Mistaken(Follower):
-    """Asks for the rates of what is no number, or when there are none."""
+class Misnames(Follower):
+    def write(self, desired: Any) -> None:
+        desired.rate("angel")
 
-    field = "angel"
+
+class Late(Follower):
     desired: Any = None
 
     def write(self, desired: Any) -> None:
         self.desired = desired
-        self.states = desired[:].copy()
-        if self.field:
-            desired.rate(self.field or None)
 
     def read(self, reading: Reading) -> None:
-        if not self.field and self.desired is not None:
+        if self.desired is not None:
             self.desired.rate("angle")
 
 
 @pytest.mark.parametrize(
-    ("field", "said"), [("angel", "no field 'angel'.*angle"), ("", "in write\\(\\) only")]
+    ("driver", "said"),
+    [(Misnames, "no field 'angel'.*angle"), (Late, r"in write\(\) only")],
 )
 def test_rates_that_are_not_there_are_a_fault_that_says_so(
-    segment: str, field: str, said: str
+    segment: str, driver: type[Follower], said: str
 ) -> None:
-    named = type("Mistaken", (Mistaken,), {"field": field})
-    with pytest.raises(o80.Error, match=said), o80.robots.load(named).inline(segment) as robot:
+    with pytest.raises(o80.Error, match=said), o80.robots.load(driver).inline(segment) as robot:
         robot.burst(1)

@@ -22,12 +22,12 @@ from o80.learning.rollouts.rollout import arrays_of
 STEPS = 11
 
 
-def collector_of(folder: Path, number: int = 1, **options: Any) -> Collector:
-    return Collector(maker(folder), number=number, seed=5, infos=INFOS, **options)
+def collector_of(folder: Path, **options: Any) -> Collector:
+    return Collector(maker(folder), number=1, seed=5, infos=INFOS, **options)
 
 
-def collected(folder: Path, count: int, number: int = 1) -> list[Rollout]:
-    with collector_of(folder, number) as collector:
+def collected(folder: Path, count: int) -> list[Rollout]:
+    with collector_of(folder) as collector:
         return [collector.collect(policy, steps=STEPS) for policy in policies(count)]
 
 

@@ -138,26 +138,6 @@ def test_loop_begins_again_as_a_restart(recorded: Path, segment: str) -> None:
         assert len(epochs) == 3
 
 
-def test_gaps_are_played_as_gaps(segment: str, tmp_path: Path) -> None:
-    path, copy = tmp_path / "run.mcap", tmp_path / "copy.mcap"
-    with (
-        o80.robots.load("two_joints").inline(segment, history=20) as arm,
-        o80.Recording(path, arm) as recording,
-    ):
-        recording.flush()
-        with recording._lock:  # the recorder is late
-            arm.burst(100)
-    last = o80.open(path)[segment].epochs[0].gaps[-1].last
-    assert last is not None
-    with o80.play(path, speed=math.inf, history=20) as playback:
-        assert playback.wait(WAIT)
-        with o80.Recording(copy, segment):
-            pass
-    again = rows_of(copy, segment)
-    assert again.iteration[0] == last + 1
-    assert again.rows.tobytes() == rows_of(path, segment).select(since=last + 1).rows.tobytes()
-
-
 def test_a_living_robot_keeps_its_name(recorded: Path, segment: str) -> None:
     with o80.robots.load("two_joints").inline(segment):
         with pytest.raises(o80.SegmentTaken, match="--prefix"):

@@ -187,11 +187,11 @@ def test_a_replay_ends_at_a_gap_of_the_journal(segment: str) -> None:
     assert "the journal lacks entries 0 to" in str(report)
 
 
-def file_of(path: Path, arm: o80.Frontend, seed: int = 3) -> Path:
+def file_of(path: Path, arm: o80.Frontend) -> Path:
     """A recording of a random run."""
     with o80.Recording(path, arm) as recording:
         for part in range(5):
-            run_bursts(arm, seed + part, 40)
+            run_bursts(arm, 3 + part, 40)
             recording.flush()
     return path
 
@@ -330,11 +330,10 @@ def test_a_recording_whose_beginning_is_missing_is_replayed_from_a_snapshot(
 # ----------------------------------------------------------------------------- two runs, row by row
 
 
-def run_of(target: float, segment: str, iterations: int = 30) -> o80.History:
+def run_of(target: float, segment: str) -> o80.History:
     with o80.robots.load("two_joints").inline(segment) as arm:
         arm.add_command("elbow", target, iterations=20)
-        arm.burst(10)
-        arm.burst(iterations - 10)
+        arm.burst(30)
         return arm.history()
 
 

@@ -16,14 +16,6 @@ from o80.replaying.trust import options_of
 from o80.rows.provenance import Provenance, ProvenanceFile
 
 
-def recording_of(folder: Path, segment: str) -> Path:
-    path = folder / "run.mcap"
-    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm):
-        arm.add_command("elbow", 0.5, iterations=10)
-        arm.burst(20)
-    return path
-
-
 @pytest.fixture
 def stray(tmp_path: Path) -> Path:
     """A library that no one has installed."""
@@ -37,10 +29,10 @@ def is_loaded(library: Path) -> bool:
 
 
 def test_a_library_that_only_the_recording_names_is_not_loaded(
-    tmp_path: Path, segment: str, stray: Path, forged: dict[str, Any]
+    stray: Path, forged: dict[str, Any], request: pytest.FixtureRequest
 ) -> None:
     forged["library"] = str(stray)
-    path = recording_of(tmp_path, segment)
+    path = request.getfixturevalue("recorded")
 
     report = o80.replay(path)  # with the robot of this name that is installed here
     assert report.identical, report
@@ -64,8 +56,8 @@ class Forged:
 
 
 @pytest.fixture
-def run(tmp_path: Path, segment: str) -> FileRun:
-    return runs_in(o80.open(recording_of(tmp_path, segment)))[0]
+def run(recorded: Path) -> FileRun:
+    return runs_in(o80.open(recorded))[0]
 
 
 def test_a_recorded_name_is_not_taken_for_a_path(run: FileRun, stray: Path) -> None:
@@ -126,10 +118,9 @@ def test_the_user_of_a_robot_in_shared_memory_may_change_its_files(segment: str)
 
 
 def test_a_segment_that_is_played_is_as_foreign_as_its_recording(
-    tmp_path: Path, segment: str
+    recorded: Path, segment: str
 ) -> None:
-    path = recording_of(tmp_path, segment)
-    with o80.play(path, speed=float("inf")) as playback:
+    with o80.play(recorded, speed=float("inf")) as playback:
         playback.wait()
         with o80.Frontend(segment, read_only=True) as arm:
             assert not LiveRun(arm).is_own
