@@ -63,7 +63,7 @@ def test_limits_idle_and_units_reach_the_frontend(segment: str) -> None:
         with o80.Frontend(segment) as frontend:
             first, _, hand = frontend.actuators
             assert [number.name for number in first.numbers] == ["position", "torque"]
-            assert first.unit == "rad"
+            assert (first.unit, hand.unit) == ("rad", "m")
             assert first.numbers[1].minimum == -5.0
             assert first.numbers[1].maximum == np.inf
             assert (hand.minimum, hand.maximum, hand.speed) == (0.0, 1.0, 2.0)

@@ -68,6 +68,9 @@ async def test_an_inline_robot_is_awaited(arm: o80.Frontend) -> None:
     arm.add_command("elbow", 0.2, iterations=7)
     assert (await arm.aio.pulse_and_wait()).iteration == 12
     await arm.aio.request("reset", seed=3)
+    arm.add_command("elbow", 0.5, until=3)
+    with pytest.raises(o80.NotCompleted):
+        await arm.aio.pulse_and_wait()
 
 
 CALLS: list[Callable[[o80.Frontend], Awaitable[object]]] = [

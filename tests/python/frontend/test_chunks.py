@@ -91,6 +91,8 @@ def test_a_wait_is_a_sign_of_life_for_each_row_and_says_when_the_robot_is_halted
         arm = o80.Frontend(segment)
         plan = arm.chunks(step=2, ease=2)
         plan.send([[0.1], [0.2]], seen=arm.latest())
+        with pytest.raises(o80.TimeoutError):  # it is not decided yet
+            plan.wait(lead=100, timeout=0.0)
         for _ in range(30):  # the plan runs dry, and no answer comes
             backend.publish(backend.step())
             assert plan.wait(lead=100, timeout=0.0).iteration == arm.published
