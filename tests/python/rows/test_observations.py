@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -205,7 +206,6 @@ def test_an_empty_history_is_saved_too(arm: o80.Frontend) -> None:
 
 
 def test_a_history_itself_is_saved(arm: o80.Frontend, tmp_path: Path) -> None:
-    h5py = pytest.importorskip("h5py")
     arm.add_command("elbow", 0.3, iterations=20)
     arm.burst(20)
     history = arm.history()

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
+import mujoco
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -400,7 +400,7 @@ def test_the_plan_of_chunks_is_drawn_ahead_of_the_newest_row(arm: o80.Frontend) 
 
 @pytest.mark.parametrize("robot", ["two_joints", "pam"])
 def test_a_chain_of_joints_ends_where_the_body_is(robot: str) -> None:
-    pytest.importorskip("mujoco")
+    """MuJoCo reads the URDF; it wants masses, which drawings lack."""
     with o80.robots.load(robot).inline() as arm:
         targets = [0.7, -0.4] if robot == "two_joints" else [18_000, 8_000] * 4
         arm.add_command(None, targets, iterations=100)
@@ -410,37 +410,19 @@ def test_a_chain_of_joints_ends_where_the_body_is(robot: str) -> None:
         assert joints is not None
         places = [number.offset for number in joints.numbers["position"]]
         names = dict(zip(places, joints.names, strict=True))
-        urdf: Any = ElementTree.fromstring(links.urdf(arm.schema, names))
-        angles = {name: np.frombuffer(row, "f8", 1, place)[0] for place, name in names.items()}
-        behind = {each.find("child").get("link"): each for each in urdf.iter("joint")}
+        drawn = mujoco.MjSpec.from_string(links.urdf(arm.schema, names))
+        for body in drawn.bodies[1:]:
+            body.mass, body.inertia, body.explicitinertial = 1.0, [1.0] * 3, True
+        model = drawn.compile()
+        data = mujoco.MjData(model)
+        for place, name in names.items():
+            data.joint(name).qpos = np.frombuffer(row, "f8", 1, place)[0]
+        mujoco.mj_kinematics(model, data)
         found = [*links.places(row)]
-        assert found
-        for link, position, _ in found:
-            at, here = np.eye(4), link
-            while here != "world":
-                joint = behind[here]
-                at, here = moved(joint, angles) @ at, joint.find("parent").get("link")
-            assert np.allclose(at[:3, 3], position, atol=1e-6), link
-
-
-def moved(joint: Any, angles: dict[str, float]) -> Any:
-    """The place of a joint's child in its parent (4, 4)."""
-    origin = joint.find("origin")
-    found = np.eye(4)
-    roll, pitch, yaw = map(float, origin.get("rpy").split())
-    found[:3, :3] = turned([0, 0, 1], yaw) @ turned([0, 1, 0], pitch) @ turned([1, 0, 0], roll)
-    found[:3, 3] = [float(word) for word in origin.get("xyz").split()]
-    if joint.get("type") in ("revolute", "continuous"):
-        axis = [float(word) for word in joint.find("axis").get("xyz").split()]
-        found[:3, :3] = found[:3, :3] @ turned(axis, angles[joint.get("name")])
-    return found
-
-
-def turned(axis: list[float], angle: float) -> Any:
-    """The rotation about an axis (Rodrigues)."""
-    x, y, z = np.array(axis) / np.linalg.norm(axis)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+        assert len(found) == model.nbody - 1
+        for link, position, (*turn, real) in found:
+            assert np.allclose(data.body(link).xpos, position, atol=1e-6), link
+            assert np.allclose(data.body(link).xquat, [real, *turn], atol=1e-6), link
 
 
 # ------------------- models of strangers: they read no file, do not hang and do not take all memory
