@@ -8,7 +8,10 @@ from gymnasium import spaces
 from gymnasium.spaces import Box
 
 import o80
-from o80.learning import GroupTask, Index, Outcome
+from o80.learning import GroupTask, Index, Outcome, VectorEnvironment
+
+COPIES, INFOS = 5, ("apart", "why")
+"""Number of the copies that collectors step, and their infos."""
 
 
 class Reach(GroupTask):
@@ -104,3 +107,8 @@ class Goal(Reach):
 
     def observe(self, copies: Index) -> Any:
         return {"seen": self.seen.observations[copies], "goal": self.goals[copies]}
+
+
+def reaching(task: type[Reach] = Reach) -> VectorEnvironment:
+    """Makes copies for a collector."""
+    return VectorEnvironment(task(COPIES, threads=1), autoreset_mode="SameStep")

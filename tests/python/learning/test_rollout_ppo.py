@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from rollout_tasks import COPIES, INFOS, maker
+from learning_tasks import COPIES, INFOS, reaching
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
@@ -93,19 +93,15 @@ class Told(BaseCallback):
         self.buffers.append(kept | {"starts": buffer.episode_starts.copy()})
 
 
-def collector_of(folder: Path) -> Collector:
-    return Collector(maker(folder), seed=5, infos=INFOS)
-
-
 @pytest.fixture(autouse=True, scope="module")
 def one_thread() -> None:
     torch.set_num_threads(1)
 
 
 @pytest.fixture(scope="module")
-def told(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Told]:
+def told() -> Iterator[Told]:
     """A training of three rollouts."""
-    with collector_of(tmp_path_factory.mktemp("told")) as collector:
+    with Collector(reaching, seed=5, infos=INFOS) as collector:
         made = Told(collector)
         model_of(collector, steps=STEPS).learn(3 * STEPS * COPIES, callback=made)
         yield made
@@ -184,8 +180,8 @@ def test_it_leaves_no_temporary_files(tmp_path: Path, monkeypatch: pytest.Monkey
     assert not list(tmp_path.iterdir())
 
 
-def test_mistakes_are_named(tmp_path: Path) -> None:
-    with collector_of(tmp_path) as collector:
+def test_mistakes_are_named() -> None:
+    with Collector(reaching, seed=5, infos=INFOS) as collector:
         environments = CollectorEnv(collector)
         model = PPO("MlpPolicy", environments, n_steps=2, batch_size=2, device="cpu")
         model.set_logger(Logger(None, []))

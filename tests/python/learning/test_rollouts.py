@@ -2,37 +2,55 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from itertools import combinations
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 from gymnasium.spaces import Box, Discrete
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from learning_tasks import Goal, Reach
-from rollout_tasks import COPIES, INFOS, assert_same_rollouts, maker, policies
+from learning_tasks import COPIES, INFOS, Goal, Reach, reaching
+from vector_equality import assert_same
 
 import o80
-from o80.learning import Environment, VectorEnvironment
-from o80.learning.rollouts import Collector, GaussianPolicy, Rollout
+from o80.learning import Environment, Outcome, VectorEnvironment
+from o80.learning.rollouts import Collector, GaussianPolicy, Make, Rollout
 from o80.learning.rollouts.collector import environment_seeds, policy_generator
 from o80.learning.rollouts.rollout import arrays_of
 
 STEPS = 11
 
 
-def collector_of(folder: Path, **options: Any) -> Collector:
-    return Collector(maker(folder), number=1, seed=5, infos=INFOS, **options)
+def policies(count: int) -> Sequence[GaussianPolicy]:
+    """Creates policies with a small network and random numbers."""
+    first = GaussianPolicy.new(6, 4, hidden=(32, 16), log_std=-0.7, seed=4)
+    random = np.random.default_rng(8)
+    return [
+        replace(
+            first,
+            mean=random.normal(0, 0.1, 6).astype(np.float32),
+            scale=random.uniform(0.5, 2, 6).astype(np.float32),
+            weights=tuple(
+                random.normal(0, 0.3, weight.shape).astype(np.float32) for weight in first.weights
+            ),
+        )
+        for _ in range(count)
+    ]
 
 
-def collected(folder: Path, count: int) -> list[Rollout]:
-    with collector_of(folder) as collector:
+def collector_of(make: Make = reaching, **options: Any) -> Collector:
+    return Collector(make, number=1, seed=5, infos=INFOS, **options)
+
+
+def collected(count: int) -> list[Rollout]:
+    with collector_of() as collector:
         return [collector.collect(policy, steps=STEPS) for policy in policies(count)]
 
 
-def test_a_rollout_is_what_its_actions_make_of_the_environments(tmp_path: Path) -> None:
-    rollouts = collected(tmp_path, 3)
+def test_a_rollout_is_what_its_actions_make_of_the_environments() -> None:
+    rollouts = collected(3)
     singles: Any = SyncVectorEnv(
         [lambda: Environment(Reach())] * COPIES, autoreset_mode=AutoresetMode.SAME_STEP
     )
@@ -68,10 +86,8 @@ def rows_of(rollout: Rollout) -> Sequence[Any]:
     return list(zip(*columns, ends.infos["apart"], ends.infos["why"], last, strict=True))
 
 
-def test_actions_are_drawn_by_the_policy_from_the_generator_of_the_iteration(
-    tmp_path: Path,
-) -> None:
-    rollouts = collected(tmp_path, 2)
+def test_actions_are_drawn_by_the_policy_from_the_generator_of_the_iteration() -> None:
+    rollouts = collected(2)
     for iteration, (policy, rollout) in enumerate(zip(policies(2), rollouts, strict=True)):
         generator = policy_generator(5, 1, iteration)
         for step in range(STEPS):
@@ -101,22 +117,38 @@ def test_the_means_are_those_of_the_network() -> None:
     assert policy.means(seen) == pytest.approx(expected, abs=1e-4)
 
 
-def test_after_an_exception_a_collector_begins_anew_and_repeats_the_iteration(
-    tmp_path: Path,
-) -> None:
-    with collector_of(tmp_path) as collector:
+class Failing(Reach):
+    """Raises in a step that a test chooses."""
+
+    made: ClassVar[list["Failing"]] = []
+    left = 0
+
+    def __init__(self, copies: int, threads: int) -> None:
+        super().__init__(copies, threads)
+        self.made.append(self)
+
+    def judge(self, copies: Any) -> Outcome:
+        self.left -= 1
+        if self.left == 0:
+            raise ArithmeticError("the ball is square")
+        return super().judge(copies)
+
+
+def test_after_an_exception_a_collector_begins_anew_and_repeats_the_iteration() -> None:
+    with collector_of(partial(reaching, Failing)) as collector:
         collector.collect(policies(2)[0], steps=STEPS)
-        (tmp_path / "raise").touch()
+        Failing.made.pop().left = 3
         with pytest.raises(ArithmeticError, match="square"):
             collector.collect(policies(2)[1], steps=STEPS)
         again = collector.collect(policies(2)[1], steps=STEPS)
         assert collector.iteration == 2
-    with collector_of(tmp_path, iteration=1) as fresh:
-        assert_same_rollouts([again], [fresh.collect(policies(2)[1], steps=STEPS)])
+    with collector_of(iteration=1) as fresh:
+        wanted = fresh.collect(policies(2)[1], steps=STEPS)
+    assert_same(dict(arrays_of(again)), dict(arrays_of(wanted)), "rollout")
 
 
-def test_arrays_are_read_only_and_shared_by_nobody(tmp_path: Path) -> None:
-    arrays = [array for each in collected(tmp_path, 2) for _, array in arrays_of(each)]
+def test_arrays_are_read_only_and_shared_by_nobody() -> None:
+    arrays = [array for each in collected(2) for _, array in arrays_of(each)]
     assert not any(array.flags.writeable for array in arrays)
     assert not any(np.shares_memory(a, b) for a, b in combinations(arrays, 2) if a.size and b.size)
 
@@ -147,16 +179,15 @@ def test_a_policy_may_be_of_ones_own_with_discrete_actions() -> None:
     assert rollout.actions.dtype == Discrete(3).dtype
 
 
-def test_mistakes_are_named(tmp_path: Path) -> None:
-    make = maker(tmp_path)
+def test_mistakes_are_named() -> None:
     policy = policies(1)[0]
     with pytest.raises(o80.InvalidArgument, match=r"SameStep, these are in NextStep: make them"):
         Collector(lambda: VectorEnvironment(Reach(2)))
     with pytest.raises(o80.InvalidArgument, match="observation_space of arrays"):
         Collector(lambda: VectorEnvironment(Goal(2), autoreset_mode="SameStep"))
     with pytest.raises(o80.InvalidArgument, match="number must be at least 0, got -1"):
-        Collector(make, number=-1)
-    with Collector(make, infos=("distance",)) as collector:
+        Collector(reaching, number=-1)
+    with Collector(reaching, infos=("distance",)) as collector:
         with pytest.raises(o80.InvalidArgument, match=r"no array 'distance' .* it has apart, "):
             collector.collect(policy, steps=20)
         with pytest.raises(o80.InvalidArgument, match="steps must be at least 1, got 0"):

@@ -399,8 +399,8 @@ def test_the_plan_of_chunks_is_drawn_ahead_of_the_newest_row(arm: o80.Frontend) 
 
 
 @pytest.mark.parametrize("robot", ["two_joints", "pam"])
-def test_a_chain_of_joints_ends_where_the_body_is(robot: str) -> None:
-    """MuJoCo reads the URDF; it wants masses, which drawings lack."""
+def test_links_and_shapes_of_a_urdf_are_where_the_model_has_them(robot: str) -> None:
+    """MuJoCo reads it; it wants masses, which drawings lack."""
     with o80.robots.load(robot).inline() as arm:
         targets = [0.7, -0.4] if robot == "two_joints" else [18_000, 8_000] * 4
         arm.add_command(None, targets, iterations=100)
@@ -410,7 +410,8 @@ def test_a_chain_of_joints_ends_where_the_body_is(robot: str) -> None:
         assert joints is not None
         places = [number.offset for number in joints.numbers["position"]]
         names = dict(zip(places, joints.names, strict=True))
-        drawn = mujoco.MjSpec.from_string(links.urdf(arm.schema, names))
+        keep = '><mujoco><compiler discardvisual="false"/></mujoco>'
+        drawn = mujoco.MjSpec.from_string(links.urdf(arm.schema, names).replace(">", keep, 1))
         for body in drawn.bodies[1:]:
             body.mass, body.inertia, body.explicitinertial = 1.0, [1.0] * 3, True
         model = drawn.compile()
@@ -423,6 +424,14 @@ def test_a_chain_of_joints_ends_where_the_body_is(robot: str) -> None:
         for link, position, (*turn, real) in found:
             assert np.allclose(data.body(link).xpos, position, atol=1e-6), link
             assert np.allclose(data.body(link).xquat, [real, *turn], atol=1e-6), link
+        whole = mujoco.MjModel.from_xml_string(arm.model)
+        wanted = mujoco.MjData(whole)
+        wanted.qpos[:] = data.qpos
+        mujoco.mj_kinematics(whole, wanted)
+        shapes = whole.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
+        assert np.allclose(data.geom_xpos, wanted.geom_xpos[shapes], atol=1e-6)
+        along, wanted_along = data.geom_xmat[:, 2::3], wanted.geom_xmat[shapes, 2::3]
+        assert np.allclose(np.abs((along * wanted_along).sum(axis=1)), 1.0)
 
 
 # ------------------- models of strangers: they read no file, do not hang and do not take all memory
