@@ -56,9 +56,14 @@ def bursting(segment: str) -> Iterator[o80.robots.Process]:
 
 
 @pytest.fixture
-def recorded(segment: str, tmp_path: Path) -> Path:
+def path(tmp_path: Path) -> Path:
+    """File in which a test records."""
+    return tmp_path / "run.mcap"
+
+
+@pytest.fixture
+def recorded(segment: str, path: Path) -> Path:
     """A recording of a moving arm of two joints, named as the test's segment: 201 rows."""
-    path = tmp_path / "run.mcap"
     with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm) as file:
         arm.add_command("elbow", 0.5, iterations=100)
         arm.burst(150)

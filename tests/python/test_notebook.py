@@ -151,16 +151,16 @@ def shown(shell: InteractiveShell, value: Any) -> str:
 
 
 def test_what_the_command_line_prints_as_tables_are_tables(
-    shell: InteractiveShell, arm: o80.Frontend, segment: str, tmp_path: Path
+    shell: InteractiveShell, arm: o80.Frontend, segment: str, path: Path
 ) -> None:
     assert f"<td>{segment}</td><td>running</td>" in shown(shell, o80.segments())
     actuators = shown(shell, arm.actuators)
     assert "<td>elbow</td><td>float64 [rad]</td><td>-3 to 3" in actuators
     assert "<td>options</td>" in shown(shell, arm.provenance)
-    with o80.Recording(tmp_path / "run.mcap", [segment]) as recording:
+    with o80.Recording(path, [segment]) as recording:
         arm.burst(30)
         recording.mark("throw", height=0.5)
-    marks = shown(shell, o80.open(tmp_path / "run.mcap").marks)
+    marks = shown(shell, o80.open(path).marks)
     assert f"<td>throw</td><td>{segment} 30</td><td>height=0.5</td>" in marks
     history = shown(shell, arm.history())
     assert "31 observations" in history

@@ -91,8 +91,7 @@ def test_what_lists_ends_with_words(segment: str, on: str) -> None:
 
 @pytest.mark.usefixtures("robot")
 @pytest.mark.parametrize("on", ["both", "ascii"])
-def test_a_recorder_records_on(segment: str, tmp_path: Path, on: str) -> None:
-    path = tmp_path / "run.mcap"
+def test_a_recorder_records_on(segment: str, path: Path, tmp_path: Path, on: str) -> None:
     done = run("record", segment, "-o", path, "--seconds", "1", on=on)
     assert done.returncode == 0  # it prints on stderr only
     assert o80.open(path)[segment].epochs[0].rows > 1

@@ -13,9 +13,8 @@ from o80.recording.scan import scan
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_finishes_the_file(
-    number: signal.Signals, process: o80.robots.Process, tmp_path: Path
+    number: signal.Signals, process: o80.robots.Process, path: Path
 ) -> None:
-    path = tmp_path / "run.mcap"
     with Running(O80, "record", process.segment, "-o", path) as recorder:
         while not path.exists() or not scan_or_none(path):
             assert recorder.poll() is None
@@ -52,13 +51,13 @@ def recorded(segment: str, path: Path, *words: str) -> str:
 
 
 def test_a_robot_that_runs_is_recorded_from_row_0_and_replays(
-    process: o80.robots.Process, tmp_path: Path
+    process: o80.robots.Process, path: Path, tmp_path: Path
 ) -> None:
     with o80.Frontend(process.segment) as arm:
         arm.wait_for(300, WAIT)
-    said = recorded(process.segment, tmp_path / "run.mcap")
+    said = recorded(process.segment, path)
     assert said.endswith("is recorded from row 0: the recording can be replayed")
-    report = o80.replay(tmp_path / "run.mcap")
+    report = o80.replay(path)
     assert report.identical, report
     assert report.runs[0].rows > 300
     from_now = recorded(process.segment, tmp_path / "now.mcap", "--from-now")
@@ -86,8 +85,7 @@ def test_a_recording_that_cannot_be_replayed_says_why(segment: str, tmp_path: Pa
         assert said.endswith("the recording can be replayed without its driver")
 
 
-def test_a_recorder_that_continues_says_where_it_goes_on(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_a_recorder_that_continues_says_where_it_goes_on(arm: o80.Frontend, path: Path) -> None:
     with o80.Recording(path, arm, split="1k") as recording:
         for _ in range(3):
             arm.burst(20)
@@ -119,8 +117,7 @@ def test_a_segment_that_is_not_there_is_waited_for_and_said(tmp_path: Path) -> N
     assert "nothing of 'nobody' was recorded" in said
 
 
-def test_info_describes_a_recording(tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_info_describes_a_recording(path: Path) -> None:
     for gain in (13.0, 13.0, 15.0):
         with (
             o80.robots.load("two_joints").inline("arm", gain=gain) as arm,

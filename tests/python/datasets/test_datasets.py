@@ -20,9 +20,8 @@ from o80.datasets.episodes import Episodes, episodes_of
 
 
 @pytest.fixture
-def recorded(arm: o80.Frontend, tmp_path: Path) -> Path:
+def recorded(arm: o80.Frontend, path: Path) -> Path:
     """Three episodes of 30, 20 and 20 steps; the second ends by itself, the last is cut."""
-    path = tmp_path / "run.mcap"
     with o80.Recording(path, arm) as recording:
         arm.burst(5)
         recording.mark("episode", task="swing", ball=3)
@@ -66,9 +65,8 @@ def test_marks_delimit_episodes_and_give_their_rewards(recorded: Path, segment: 
     [{"reward": "high"}, {"reward": None}, {"reward": [1]}, {"rewards": 3.0}, {"rewards": ["a"]}],
 )
 def test_a_reward_that_is_no_number_is_refused(
-    arm: o80.Frontend, tmp_path: Path, values: dict[str, Any]
+    arm: o80.Frontend, path: Path, values: dict[str, Any]
 ) -> None:
-    path = tmp_path / "run.mcap"
     with o80.Recording(path, arm) as recording:
         recording.mark("episode")
         arm.burst(10)
@@ -93,8 +91,9 @@ class Blinking:
         reading.observed = [0.1 * self.rows, np.nan if self.rows == 5 else 1.0]
 
 
-def test_statistics_leave_out_what_is_not_finite_and_say_so(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_statistics_leave_out_what_is_not_finite_and_say_so(
+    segment: str, path: Path, tmp_path: Path
+) -> None:
     with (
         o80.robots.load(Blinking).inline(segment) as arm,
         o80.Recording(path, arm) as recording,
@@ -126,8 +125,7 @@ def test_steps_may_be_several_iterations(recorded: Path, segment: str, every: fl
     assert found.all[0].rewards.tolist() == [0.25, 0, 0]
 
 
-def test_an_episode_that_a_fresh_start_cuts_is_said(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_an_episode_that_a_fresh_start_cuts_is_said(arm: o80.Frontend, path: Path) -> None:
     with o80.Recording(path, arm) as recording:
         recording.mark("episode")
         arm.burst(10)
@@ -145,10 +143,7 @@ def test_an_episode_that_a_fresh_start_cuts_is_said(arm: o80.Frontend, tmp_path:
     assert f"ends at row {cut}, where the robot made a fresh start" in why
 
 
-def test_rewards_of_all_steps_may_come_with_the_last_mark(
-    arm: o80.Frontend, tmp_path: Path
-) -> None:
-    path = tmp_path / "run.mcap"
+def test_rewards_of_all_steps_may_come_with_the_last_mark(arm: o80.Frontend, path: Path) -> None:
     rewards = [0.0, 0.5, 1.0]
     with o80.Recording(path, arm) as recording:
         recording.mark("episode")
@@ -160,8 +155,7 @@ def test_rewards_of_all_steps_may_come_with_the_last_mark(
     assert episodes(path).all[0].rewards.sum() == sum(rewards)
 
 
-def test_an_episode_with_a_gap_is_left_out_and_said(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_an_episode_with_a_gap_is_left_out_and_said(segment: str, path: Path) -> None:
     with (
         o80.robots.load("two_joints").inline(segment, history=20) as arm,
         o80.Recording(path, arm) as recording,
@@ -179,8 +173,7 @@ def test_an_episode_with_a_gap_is_left_out_and_said(segment: str, tmp_path: Path
     assert "gap" in found.left_out[0]
 
 
-def test_episodes_of_restarted_robots_are_those_of_their_run(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_episodes_of_restarted_robots_are_those_of_their_run(segment: str, path: Path) -> None:
     with o80.Recording(path, segment) as recording:
         rows = 0
         for run, count in enumerate((10, 20)):
@@ -196,22 +189,21 @@ def test_episodes_of_restarted_robots_are_those_of_their_run(segment: str, tmp_p
     assert [(each.values["run"], len(each)) for each in found.all] == [(0, 10), (1, 20)]
 
 
-def test_a_recording_without_episodes_is_refused(arm: o80.Frontend, tmp_path: Path) -> None:
-    with o80.Recording(tmp_path / "run.mcap", arm):
+def test_a_recording_without_episodes_is_refused(arm: o80.Frontend, path: Path) -> None:
+    with o80.Recording(path, arm):
         arm.burst(5)
     with pytest.raises(o80.InvalidArgument, match=r'recording.mark\("episode"\)'):
-        episodes(tmp_path / "run.mcap")
+        episodes(path)
     with pytest.raises(o80.InvalidArgument, match="no segment 'leg'"):
-        episodes(tmp_path / "run.mcap", segment="leg")
+        episodes(path, segment="leg")
 
 
 # ---------------------------------------------------------------------------- LeRobot
 
 
 def test_thirty_rows_a_second_are_thirty_although_a_period_is_in_whole_ns(
-    segment: str, tmp_path: Path
+    segment: str, path: Path, tmp_path: Path
 ) -> None:
-    path = tmp_path / "run.mcap"
     with (
         o80.robots.load("two_joints").inline(segment, frequency=150) as arm,
         o80.Recording(path, arm) as recording,
@@ -279,8 +271,9 @@ class Slow(Obedient):
     limits: ClassVar = {"elbow": o80.Limits(minimum=-2, maximum=2, speed=10.0)}
 
 
-def test_a_data_set_has_what_was_asked_for_and_what_acted(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_a_data_set_has_what_was_asked_for_and_what_acted(
+    segment: str, path: Path, tmp_path: Path
+) -> None:
     with (
         o80.robots.load(Slow).inline(segment, frequency=1000) as arm,
         o80.Recording(path, arm) as recording,
@@ -349,8 +342,9 @@ def test_numbers_and_units_of_a_lerobot_data_set_are_chosen(recorded: Path, tmp_
             write(tmp_path / "no", **options)
 
 
-def test_times_are_k_over_fps_and_the_true_ones_beside_them(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_times_are_k_over_fps_and_the_true_ones_beside_them(
+    segment: str, path: Path, tmp_path: Path
+) -> None:
     sensors = {"capture_time": np.int64}
     with o80.Backend(segment, ["lift"], extended=sensors, frequency=100) as backend:
 
@@ -385,9 +379,8 @@ def test_a_folder_that_exists_is_not_overwritten(recorded: Path, tmp_path: Path)
 
 
 def test_the_latency_of_another_episode_or_of_an_order_that_says_nothing_is_not_known(
-    arm: o80.Frontend, tmp_path: Path
+    arm: o80.Frontend, path: Path
 ) -> None:
-    path = tmp_path / "run.mcap"
     with o80.Recording(path, arm) as recording:
         for _ in range(2):
             recording.mark("episode")
@@ -405,8 +398,7 @@ def test_the_latency_of_another_episode_or_of_an_order_that_says_nothing_is_not_
         assert np.isfinite(episode.delays).tolist() == [False] * 2 + [True] * 3 + [False] * 2
 
 
-def test_a_learner_gets_no_times_of_clocks_unless_it_asks(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_a_learner_gets_no_times_of_clocks_unless_it_asks(segment: str, path: Path) -> None:
     sensors = {"force": (np.float64, 2), "capture_time": np.int64, "heat": np.float64}
     with o80.Backend(segment, ["lift"], extended=sensors) as backend:
 
@@ -428,10 +420,7 @@ def test_a_learner_gets_no_times_of_clocks_unless_it_asks(segment: str, tmp_path
         episodes(path, fields=["fource"])
 
 
-def test_marks_that_look_like_those_of_episodes_are_named(
-    arm: o80.Frontend, tmp_path: Path
-) -> None:
-    path = tmp_path / "run.mcap"
+def test_marks_that_look_like_those_of_episodes_are_named(arm: o80.Frontend, path: Path) -> None:
     with o80.Recording(path, arm) as recording:
         for mark in ("episode: one", "episode:two", "Episode", "touched", "episode-end"):
             recording.mark(mark)
@@ -481,9 +470,9 @@ def test_the_command_writes_a_data_set(recorded: Path, tmp_path: Path) -> None:
 
 
 def test_actions_come_with_the_latency_of_their_decisions(
-    arm: o80.Frontend, tmp_path: Path
+    arm: o80.Frontend, path: Path, tmp_path: Path
 ) -> None:
-    with o80.Recording(tmp_path / "run.mcap", arm) as recording:
+    with o80.Recording(path, arm) as recording:
         recording.mark("episode")
         arm.burst(4)
         for delay in (1, 3):
@@ -492,7 +481,7 @@ def test_actions_come_with_the_latency_of_their_decisions(
             arm.add_command("elbow", 0.1 * delay)
             arm.burst(2, seen=seen)
         recording.mark("episode_end")
-    found = episodes(tmp_path / "run.mcap", every=2)
+    found = episodes(path, every=2)
     (episode,) = found.all
 
     iterations = [2, 4, 6, 8, 10, 12]  # at the ends of the steps; batches began at 6 and 11

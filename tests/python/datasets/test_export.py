@@ -79,8 +79,7 @@ def test_an_unknown_field_and_too_many_panels_are_refused(arm: o80.Frontend) -> 
         plot(many)
 
 
-def test_marks_are_drawn_in_their_run_where_they_were_made(tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_marks_are_drawn_in_their_run_where_they_were_made(path: Path) -> None:
     for text, rows in (("first $x", 100), ("second", 50)):
         with (
             o80.robots.load("two_joints").inline("arm") as arm,
@@ -110,13 +109,13 @@ def test_an_enumeration_has_its_labels_at_the_axis() -> None:
     ]
 
 
-def test_the_commands_write_files(arm: o80.Frontend, tmp_path: Path) -> None:
-    with o80.Recording(tmp_path / "run.mcap", arm):
+def test_the_commands_write_files(arm: o80.Frontend, path: Path, tmp_path: Path) -> None:
+    with o80.Recording(path, arm):
         arm.burst(20)
     for words, said in (
-        (["plot", tmp_path / "run.mcap", "-o", tmp_path / "run.png"], "21 rows"),
+        (["plot", path, "-o", tmp_path / "run.png"], "21 rows"),
         (["plot", arm.segment, "--seconds", "0.005", "-o", tmp_path / "live.png"], "5 rows"),
-        (["export", tmp_path / "run.mcap", "-o", tmp_path / "run.npz"], "21 rows"),
+        (["export", path, "-o", tmp_path / "run.npz"], "21 rows"),
     ):
         assert said in run_o80(*words).stdout
 

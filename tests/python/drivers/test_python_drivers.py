@@ -408,7 +408,9 @@ def test_a_driver_that_is_wrong_is_refused_with_a_cure(
         o80.robots.load(made(**members)).inline(segment)
 
 
-def test_a_recording_cannot_name_a_class_to_import(segment: str, tmp_path: Path) -> None:
+def test_a_recording_cannot_name_a_class_to_import(
+    segment: str, path: Path, tmp_path: Path
+) -> None:
     """It is replayed without its driver, or not at all."""
     snapshots = {name: {"slot": np.uint32} for name in ("snapshot", "restore")}
     members = {
@@ -424,7 +426,7 @@ def test_a_recording_cannot_name_a_class_to_import(segment: str, tmp_path: Path)
             o80.Recording(tmp_path / file, [segment]),
         ):
             joint.burst(5)
-    by_readings = o80.replay(tmp_path / "run.mcap")
+    by_readings = o80.replay(path)
     assert str(by_readings) == f"{segment}: 6 rows, no driver was started: desired states identical"
     assert any("the robot may be hardware" in note for note in by_readings.runs[0].notes)
     with pytest.raises(o80.DriverError, match="joint"):

@@ -32,12 +32,12 @@ def run(closed: tuple[int, ...], *words: object) -> None:
 
 @closed_subsets
 def test_a_robot_is_recorded_halted_resumed_and_stopped(
-    closed: tuple[int, ...], segment: str, tmp_path: Path
+    closed: tuple[int, ...], segment: str, path: Path
 ) -> None:
     words = ["run", "two_joints", "--segment", segment, "--frequency", 100]
     with started(closed, O80, *words) as robot:
         with o80.Frontend(segment, timeout=WAIT) as arm:
-            recording = tmp_path / "run.mcap"
+            recording = path
             recorder = started(closed, O80, "record", segment, "-o", recording)
             while not recording.exists():
                 arm.wait_for(arm.published + 1, timeout=WAIT)

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable
 from enum import IntEnum
 from fractions import Fraction
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -271,7 +272,7 @@ def marked(history: o80.History) -> list[int]:
 
 
 def test_a_starved_plan_is_marked_counted_and_replayed(
-    segment: str, arm: o80.Frontend, tmp_path: Any
+    segment: str, arm: o80.Frontend, path: Path
 ) -> None:
     def burst_and_look(iterations: int, plan: o80.Chunks) -> None:
         for _ in range(iterations):
@@ -300,18 +301,18 @@ def test_a_starved_plan_is_marked_counted_and_replayed(
     history = arm.history()
     assert marked(history) == [151, 161, 211, 221, 351, 356]
     assert history.starvations[[150, 151, 210, 211, 370]].tolist() == [0, 1, 1, 2, 3]
-    run_o80("save", segment, "-o", tmp_path / "run.mcap")
-    for name in (segment, tmp_path / "run.mcap"):
+    run_o80("save", segment, "-o", path)
+    for name in (segment, path):
         shown = run_o80("info", name).stdout
         assert "plans of chunks ran out of rows 3 times" in shown, shown
     said = [command_text(each) for entry in arm.journal() for each in entry.commands]
     assert ["the last of its plan" in line for line in said] == [False] * 3 + [True, False, False]
     assert said[-1] == "close plan"
-    for run in (tmp_path / "run.mcap", arm):
-        assert o80.replay(run).identical
-    (run,) = o80.replay(tmp_path / "run.mcap", driver=False)
+    for source in (path, arm):
+        assert o80.replay(source).identical
+    (run,) = o80.replay(path, driver=False)
     assert run.identical
-    (run,) = o80.replay(tmp_path / "run.mcap", driver=False, since=305)
+    (run,) = o80.replay(path, driver=False, since=305)
     assert run.identical
     assert run.rows <= 20, "it begins where the plan is closed"
 

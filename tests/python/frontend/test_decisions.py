@@ -94,12 +94,12 @@ def test_it_changes_no_motion(segment: str) -> None:
     assert silent.rows.tobytes() == told.rows.tobytes()
 
 
-def test_the_journal_says_it_and_echo_prints_it(arm: o80.Frontend, tmp_path: Path) -> None:
-    with o80.Recording(tmp_path / "run.mcap", arm):
+def test_the_journal_says_it_and_echo_prints_it(arm: o80.Frontend, path: Path) -> None:
+    with o80.Recording(path, arm):
         decide(arm, [1, 4, 2])
     taken = [entry for entry in arm.journal() if entry.kind == "taken" and entry.commands]
     assert [len(entry.commands) for entry in taken] == [1, 1, 1]
-    (recorded,) = o80.open(tmp_path / "run.mcap")[arm.segment].epochs
+    (recorded,) = o80.open(path)[arm.segment].epochs
     for entries in (arm.journal(), recorded.journal(), recorded.native_journal()):
         found = decisions(entries)
         assert found.iteration.tolist() == [0, 1, 5]
@@ -112,17 +112,16 @@ def test_the_journal_says_it_and_echo_prints_it(arm: o80.Frontend, tmp_path: Pat
         "p95": 4,
         "max": 4,
     }
-    refused = run_o80("echo", str(tmp_path / "run.mcap"), code=1).stderr
+    refused = run_o80("echo", str(path), code=1).stderr
     assert "is a recording: `o80 echo --commands" in " ".join(refused.split())
-    lines = run_o80("echo", "--commands", str(tmp_path / "run.mcap")).stdout
+    lines = run_o80("echo", "--commands", str(path)).stdout
     assert "elbow to 0.01, decided 4 iterations before" in lines
-    said = run_o80("echo", "--commands", "--json", str(tmp_path / "run.mcap")).stdout.splitlines()
+    said = run_o80("echo", "--commands", "--json", str(path)).stdout.splitlines()
     seen = [entry["seen"] for entry in map(json.loads, said) if entry["seen"]]
     assert [each["iteration"] for each in seen] == [0, 1, 5]
 
 
-def test_info_and_plot_show_it(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_info_and_plot_show_it(arm: o80.Frontend, path: Path) -> None:
     with o80.Recording(path, arm):
         decide(arm, [2] * 37 + [5, 5, 9])
     said = "decision latency of 40 batches in iterations of 1 ms: median 2, 95 % 5, "
@@ -162,13 +161,13 @@ def test_what_is_no_observation_is_refused(arm: o80.Frontend, wrong: object) -> 
 
 
 def test_rows_know_their_run_wherever_they_went(
-    arm: o80.Frontend, segment: str, tmp_path: Path
+    arm: o80.Frontend, segment: str, path: Path
 ) -> None:
-    with o80.Recording(tmp_path / "run.mcap", arm):
+    with o80.Recording(path, arm):
         arm.burst(3)
     epoch = arm.latest().epoch
     assert epoch != 0
-    recorded = o80.open(tmp_path / "run.mcap")[segment].history()
+    recorded = o80.open(path)[segment].history()
     for row in (
         arm.history()[-1],
         pickle.loads(pickle.dumps(arm.latest())),

@@ -151,17 +151,17 @@ def test_an_offset_moves_the_times_of_a_source(segment: str) -> None:
     assert joined["other"].extended.count.tolist() == [0, 1]
 
 
-def test_a_recording_is_joined_like_the_running_robots(segment: str, tmp_path: Path) -> None:
+def test_a_recording_is_joined_like_the_running_robots(segment: str, path: Path) -> None:
     names = [segment, segment + "-other"]
     with (
         o80.robots.load("two_joints").inline(names[0], frequency=500) as one,
         o80.robots.load("two_joints").inline(names[1], frequency=100) as other,
-        o80.Recording(tmp_path / "run.mcap", names),
+        o80.Recording(path, names),
     ):
         for _ in range(10):
             o80.burst({one: 5, other: 1})
         live = o80.align([one, other], by=names[1])
-    recorded = o80.align(o80.open(tmp_path / "run.mcap"), by=names[1])
+    recorded = o80.align(o80.open(path), by=names[1])
     np.testing.assert_array_equal(live.time, recorded.time)
     np.testing.assert_array_equal(live[names[0]].rows, recorded[names[0]].rows)
     assert live[names[0]].iteration.tolist() == list(range(0, 51, 5))
@@ -407,17 +407,17 @@ def test_wrong_arguments_of_a_delay_are_named(segment: str) -> None:
             o80.latency(signal_of_one, value, most=most)
 
 
-def test_the_command_tells_the_delay_in_a_recording(segment: str, tmp_path: Path) -> None:
+def test_the_command_tells_the_delay_in_a_recording(segment: str, path: Path) -> None:
     with (
         o80.robots.load("two_joints").inline(segment, gain=20.0) as arm,
-        o80.Recording(tmp_path / "run.mcap", [segment]),
+        o80.Recording(path, [segment]),
     ):
         targets = np.random.default_rng(3).uniform(-1, 1, (20, 2))
         arm.add_trajectory(targets, iterations=100)
         arm.pulse()
         for _ in range(20):
             arm.burst(100)
-    where: list[str | Path] = ["--recording", tmp_path / "run.mcap", "--most", "0.3"]
+    where: list[str | Path] = ["--recording", path, "--most", "0.3"]
     desired, observed = f"{segment}:desired.elbow", f"{segment}:observed.elbow"
     said = o80_says("latency", desired, observed, *where)
     assert said.startswith(f"{observed} behind {desired}: ")

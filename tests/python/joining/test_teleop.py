@@ -341,9 +341,8 @@ def test_who_waits_gives_signs_of_life(
 
 
 def test_demonstrations_are_of_a_robot_that_follows(
-    hand: o80.Frontend, arm: o80.Frontend, tmp_path: Path
+    hand: o80.Frontend, arm: o80.Frontend, path: Path
 ) -> None:
-    path = tmp_path / "run.mcap"
     with o80.Frontend(arm.segment) as other, o80.Recording(path, arm) as recording:
         robots = o80.Teleoperation(hand, other)
         other.mark("episode: of a session that was killed")
@@ -409,7 +408,7 @@ def test_robots_without_a_common_joint_are_refused(segment: str) -> None:
             o80.Teleoperation(hand, arm)
 
 
-def test_the_command_marks_demonstrations_by_keys(segment: str, tmp_path: Path) -> None:
+def test_the_command_marks_demonstrations_by_keys(segment: str, path: Path) -> None:
     one, other = f"{segment}-1", f"{segment}-2"
     robot = o80.robots.load("two_joints")
     main, side = pty.openpty()
@@ -419,7 +418,7 @@ def test_the_command_marks_demonstrations_by_keys(segment: str, tmp_path: Path) 
         robot.start(other, frequency=200) as follows,
         leads.frontend() as hand,
         follows.frontend() as arm,
-        o80.Recording(tmp_path / "run.mcap", arm) as recording,
+        o80.Recording(path, arm) as recording,
         subprocess.Popen(words, stdin=side, stdout=subprocess.PIPE, stderr=side) as command,
     ):
         os.close(side)
@@ -458,7 +457,7 @@ def test_the_command_marks_demonstrations_by_keys(segment: str, tmp_path: Path) 
         recording.flush()
         assert arm.latest().desired[1] == pytest.approx(0.0, abs=0.2)
     assert said.startswith("1 demonstration; delay from hand to motor")
-    episodes = episodes_of(o80.open(tmp_path / "run.mcap"))
+    episodes = episodes_of(o80.open(path))
     (kept,) = episodes.all
     assert (kept.task, kept.terminated) == ("wave", True)
     assert np.ptp(kept.rows.observed[:, 1]) > 0.3

@@ -104,8 +104,7 @@ def test_a_part_is_played(recorded: Path, segment: str) -> None:
         o80.play(recorded, begin=1000.0)
 
 
-def test_restarts_are_played_as_restarts(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_restarts_are_played_as_restarts(segment: str, path: Path, tmp_path: Path) -> None:
     with o80.Recording(path, segment) as recording:
         for count in (30, 20):
             with o80.robots.load("two_joints").inline(segment) as arm:
@@ -181,8 +180,7 @@ def test_the_journal_is_played(recorded: Path, segment: str) -> None:
         assert any(entry.status is o80.Status.COMPLETED for entry in arm.journal())
 
 
-def test_a_fault_of_the_recorded_robot_is_raised_again(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_a_fault_of_the_recorded_robot_is_raised_again(segment: str, path: Path) -> None:
     with o80.Recording(path, segment) as recording:
 
         def break_down() -> None:

@@ -40,11 +40,11 @@ def record(path: Path, segment: str) -> Path:
 
 @pytest.mark.parametrize("name", ["../../evil", "/etc/x", "x\x1b[31m", "", ".hidden", "a" * 65])
 def test_a_name_that_leads_elsewhere_is_refused(
-    name: str, segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, segment: str, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     texts = EpochNote.texts
     monkeypatch.setattr(EpochNote, "texts", lambda self: texts(self) | {"segment": name})
-    path = record(tmp_path / "run.mcap", segment)
+    record(path, segment)
     with pytest.raises(o80.RecordingError, match="cannot be the name of a segment") as refused:
         o80.open(path)
     assert "\x1b" not in str(refused.value)
@@ -74,6 +74,7 @@ PROVENANCES = [
 def test_a_damaged_provenance_is_told(
     text: str,
     segment: str,
+    path: Path,
     tmp_path: Path,
     forged: dict[str, Any],
     monkeypatch: pytest.MonkeyPatch,
@@ -83,7 +84,7 @@ def test_a_damaged_provenance_is_told(
         forged |= json.loads(text)
     else:
         monkeypatch.setattr(Provenance, "as_json", lambda _: text)
-    path = record(tmp_path / "run.mcap", segment)
+    record(path, segment)
     (epoch,) = o80.open(path)[segment].epochs
     assert len(epoch.history()) == 21
     for read in (lambda: epoch.provenance, lambda: o80.replay(path)):
@@ -96,22 +97,22 @@ def test_a_damaged_provenance_is_told(
 
 @pytest.mark.parametrize("values", ["", "{", "[1]", "5", "[" * 100_000])
 def test_a_mark_with_damaged_values_is_refused(
-    values: str, segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    values: str, segment: str, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("o80.recording.marks.json_text", lambda *_, **__: values)
-    path = record(tmp_path / "run.mcap", segment)
+    record(path, segment)
     with pytest.raises(o80.RecordingError):
         _ = o80.open(path).marks
 
 
 def test_texts_of_a_recording_do_not_control_the_terminal(
-    segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    segment: str, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     as_json, forged = Machine.as_json, {"libc": "\x1b[2J\x07 1"}
     monkeypatch.setattr(
         Machine, "as_json", lambda self: json.dumps(json.loads(as_json(self)) | forged)
     )
-    path = record(tmp_path / "run.mcap", segment)
+    record(path, segment)
     done = run_o80("replay", path, code=None)
     assert "recorded it" in done.stdout
     assert not {"\x1b", "\x07"} & set(done.stdout + done.stderr)
@@ -210,23 +211,21 @@ def with_changed_index(whole: bytes, indexes: bytes, at: int) -> bytes:
     return bytes(data)
 
 
-def test_a_file_damaged_anywhere_is_read_or_refused_in_a_sentence(
-    segment: str, tmp_path: Path
-) -> None:
-    whole = record(tmp_path / "run.mcap", segment).read_bytes()
-    indexes = bytes(scan(tmp_path / "run.mcap").chunks.records)
+def test_a_file_damaged_anywhere_is_read_or_refused_in_a_sentence(segment: str, path: Path) -> None:
+    whole = record(path, segment).read_bytes()
+    indexes = bytes(scan(path).chunks.records)
     files = [damaged(whole, random.Random(seed)) for seed in range(200)]
     files += [with_changed_index(whole, indexes, at) for at in range(len(indexes))]
     sentences = set()
     for number, data in enumerate(files):
-        path = tmp_path / f"{number}" / "damaged.mcap"
-        path.parent.mkdir()
-        path.write_bytes(data)
+        damaged_file = path.parent / f"{number}" / "damaged.mcap"
+        damaged_file.parent.mkdir()
+        damaged_file.write_bytes(data)
         for read in (read_all, info_of, repair, read_all):
             try:
-                read(path)
+                read(damaged_file)
             except o80.Error as refused:
-                sentences.add(str(refused).replace(str(path), "PATH"))
+                sentences.add(str(refused).replace(str(damaged_file), "PATH"))
             except Exception as error:
                 raise AssertionError(f"file {number}: {read.__name__}") from error
     assert all("PATH" in each for each in sentences)
@@ -287,9 +286,9 @@ def test_repair_keeps_all_rows_but_those_of_a_damaged_chunk(
 
 
 def test_repair_overwrites_no_damaged_file_that_was_kept_and_none_that_is_written(
-    segment: str, tmp_path: Path
+    segment: str, path: Path
 ) -> None:
-    path = record(tmp_path / "run.mcap", segment)
+    record(path, segment)
     data = bytearray(path.read_bytes())
     data[min(scan(path).chunks[0].message_index_offsets.values()) - 1] ^= 1
     path.write_bytes(data)

@@ -25,15 +25,15 @@ def recorded(segment: str, path: Path) -> o80.History:
     return o80.open(path)[segment].history()
 
 
-def test_fields_of_a_state_are_position_velocity_and_effort(segment: str, tmp_path: Path) -> None:
+def test_fields_of_a_state_are_position_velocity_and_effort(segment: str, path: Path) -> None:
     with o80.Backend(segment, {"joints": (JOINT, 3), "grip": "f8"}, bursting=True) as backend:
         observed = np.zeros(3, JOINT)
         for name in JOINT.names or ():
             observed[name] = np.arange(3) + ord(name[0])
         backend.publish({"joints": observed, "grip": 7.0})
         names = [actuator.name for actuator in o80.Frontend(segment).actuators]
-        recorded(segment, tmp_path / "run.mcap")
-    (state,) = joint_states(tmp_path / "run.mcap", segment)
+        recorded(segment, path)
+    (state,) = joint_states(path, segment)
 
     assert state.name == names[:3]
     assert state.position.tolist() == observed["position"].tolist()
@@ -41,13 +41,13 @@ def test_fields_of_a_state_are_position_velocity_and_effort(segment: str, tmp_pa
     assert state.effort.tolist() == observed["torque"].tolist()
 
 
-def test_sensor_values_that_are_joint_positions_are_joints(segment: str, tmp_path: Path) -> None:
+def test_sensor_values_that_are_joint_positions_are_joints(segment: str, path: Path) -> None:
     sensors = np.dtype([("joint_positions", "f8", 4), ("joint_velocities", "f8", 4)])
     with o80.Backend(segment, ["a", "b"], extended=sensors, bursting=True) as backend:
         values = {"joint_positions": [1.0, 2, 3, 4], "joint_velocities": [5.0, 6, 7, 8]}
         backend.publish([0.0, 0.0], values)
-        recorded(segment, tmp_path / "run.mcap")
-    (state,) = joint_states(tmp_path / "run.mcap", segment)
+        recorded(segment, path)
+    (state,) = joint_states(path, segment)
 
     assert state.name == ["joint_0", "joint_1", "joint_2", "joint_3"]
     assert state.position.tolist() == values["joint_positions"]
@@ -58,19 +58,16 @@ def test_sensor_values_that_are_joint_positions_are_joints(segment: str, tmp_pat
 @pytest.mark.parametrize(
     "state", ["f8", "i8", np.dtype([("pressure", "f8")]), np.dtype([("position", "f8", 3)])]
 )
-def test_a_robot_without_joints_has_no_joint_states(
-    state: Any, segment: str, tmp_path: Path
-) -> None:
+def test_a_robot_without_joints_has_no_joint_states(state: Any, segment: str, path: Path) -> None:
     with o80.Backend(segment, ["a", "b"], state, bursting=True) as backend:
         backend.publish()
         assert joints_of(o80.Frontend(segment)._layout) is None
-        recorded(segment, tmp_path / "run.mcap")
+        recorded(segment, path)
 
-    assert joint_states(tmp_path / "run.mcap", segment) == []
+    assert joint_states(path, segment) == []
 
 
-def test_a_successor_goes_on_in_the_same_channel(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_a_successor_goes_on_in_the_same_channel(arm: o80.Frontend, path: Path) -> None:
     for _ in range(2):
         arm.burst(10)
         o80.Recording(path, arm, proceed=path.exists()).close()

@@ -15,8 +15,7 @@ from o80.recording.recorded_epoch import RecordedEpoch
 from o80.recording.recorder import Recorder
 
 
-def test_a_program_records_what_it_does(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_a_program_records_what_it_does(arm: o80.Frontend, path: Path) -> None:
     arm.burst(10)
     with o80.Recording(path, arm, from_now=True) as recording:
         recording.mark("episode", number=3, ball=[0.1, 0.2])
@@ -38,9 +37,8 @@ def test_a_program_records_what_it_does(arm: o80.Frontend, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("split", [None, "8k"])
 def test_a_robot_that_restarts_goes_on_in_the_same_recording(
-    split: str | None, segment: str, tmp_path: Path
+    split: str | None, segment: str, path: Path
 ) -> None:
-    path = tmp_path / "run.mcap"
     recorder = Recorder(path, [segment], split=split)  # before the robot is there
     rows = []
     for count in (300, 200):
@@ -64,8 +62,8 @@ def test_a_robot_that_restarts_goes_on_in_the_same_recording(
         recorded.history()
 
 
-def test_segments_of_a_pattern_join_when_they_appear(segment: str, tmp_path: Path) -> None:
-    recorder = Recorder(tmp_path / "run.mcap", [f"{segment}*"])
+def test_segments_of_a_pattern_join_when_they_appear(segment: str, path: Path) -> None:
+    recorder = Recorder(path, [f"{segment}*"])
     load = o80.robots.load("two_joints")
     with load.inline(f"{segment}-a") as one, load.inline(f"{segment}-b") as other:
         recorder._search()
@@ -73,7 +71,7 @@ def test_segments_of_a_pattern_join_when_they_appear(segment: str, tmp_path: Pat
         other.burst(7)
         recorder.catch_up()
     recorder.finish()
-    file = o80.open(tmp_path / "run.mcap")
+    file = o80.open(path)
 
     rows = {name: file[name].epochs[0].rows for name in file}
     assert rows == {f"{segment}-a": 6, f"{segment}-b": 8}
@@ -96,11 +94,11 @@ class RestartsWhenAsked:
         return False
 
 
-def test_the_last_rows_before_a_restart_are_not_lost(segment: str, tmp_path: Path) -> None:
+def test_the_last_rows_before_a_restart_are_not_lost(segment: str, path: Path) -> None:
     load = o80.robots.load("two_joints").inline
     with contextlib.ExitStack() as stack:
         arm = load(segment)
-        recorder = Recorder(tmp_path / "run.mcap", [segment])
+        recorder = Recorder(path, [segment])
         recorder.catch_up()
 
         def restart() -> None:
@@ -116,11 +114,10 @@ def test_the_last_rows_before_a_restart_are_not_lost(segment: str, tmp_path: Pat
             recorder.poll()
         recorder.finish()
 
-    assert [epoch.rows for epoch in o80.open(tmp_path / "run.mcap")[segment].epochs] == [6, 1]
+    assert [epoch.rows for epoch in o80.open(path)[segment].epochs] == [6, 1]
 
 
-def test_marks_of_frontends_are_recorded_at_their_rows(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_marks_of_frontends_are_recorded_at_their_rows(arm: o80.Frontend, path: Path) -> None:
     arm.mark("before")  # still in the ring when the recorder begins
     arm.burst(10)
     with o80.Recording(path, arm.segment):
@@ -146,8 +143,7 @@ def test_marks_of_frontends_are_recorded_at_their_rows(arm: o80.Frontend, tmp_pa
     assert logged == [int(times[row]) + epoch.wall_offset for row in (1, 31, 51)]
 
 
-def test_chunks_grow_to_a_quarter_of_what_the_robot_holds(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_chunks_grow_to_a_quarter_of_what_the_robot_holds(segment: str, path: Path) -> None:
     with o80.robots.load("two_joints").inline(segment, history=1000) as arm:
         arm.burst(5000)
         recorder = Recorder(path, [segment])
@@ -169,9 +165,9 @@ def test_chunks_grow_to_a_quarter_of_what_the_robot_holds(segment: str, tmp_path
         assert rows.iteration[-1] == 5710
 
 
-def test_a_chunk_is_due_when_the_journal_fills(segment: str, tmp_path: Path) -> None:
+def test_a_chunk_is_due_when_the_journal_fills(segment: str, path: Path) -> None:
     with o80.robots.load("two_joints").inline(segment, journal=0.5) as arm:
-        recorder = Recorder(tmp_path / "run.mcap", [segment])
+        recorder = Recorder(path, [segment])
         arm.burst(20_000)
         recorder._begun -= 60.0
         recorder.catch_up()
@@ -189,8 +185,8 @@ def test_a_chunk_is_due_when_the_journal_fills(segment: str, tmp_path: Path) -> 
         assert journal.missed == 0
 
 
-def test_a_closed_recording_says_so(arm: o80.Frontend, tmp_path: Path) -> None:
-    recording = o80.Recording(tmp_path / "run.mcap", arm)
+def test_a_closed_recording_says_so(arm: o80.Frontend, path: Path) -> None:
+    recording = o80.Recording(path, arm)
     recording.close()
     recording.close()
 
@@ -215,8 +211,7 @@ def play(arm: o80.Frontend, commands: int) -> None:
         arm.burst(3)
 
 
-def test_the_journal_of_a_file_is_that_of_the_robot(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_the_journal_of_a_file_is_that_of_the_robot(arm: o80.Frontend, path: Path) -> None:
     with o80.Recording(path, arm) as recording:
         play(arm, 10)
         arm.request("reset", seed=3)
@@ -232,18 +227,17 @@ def test_the_journal_of_a_file_is_that_of_the_robot(arm: o80.Frontend, tmp_path:
     assert recorded(path).journal_gaps == []
 
 
-def test_entries_are_chosen_by_their_number(arm: o80.Frontend, tmp_path: Path) -> None:
-    with o80.Recording(tmp_path / "run.mcap", arm):
+def test_entries_are_chosen_by_their_number(arm: o80.Frontend, path: Path) -> None:
+    with o80.Recording(path, arm):
         play(arm, 10)
-    epoch = recorded(tmp_path / "run.mcap")
+    epoch = recorded(path)
 
     assert repr(epoch.journal(since=40)) == repr(arm.journal(since=40))
     with pytest.raises(o80.InvalidArgument, match="since must be"):
         epoch.journal(since=-1)
 
 
-def test_entries_that_were_overwritten_are_a_gap(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_entries_that_were_overwritten_are_a_gap(segment: str, path: Path) -> None:
     with o80.robots.load("two_joints").inline(segment, journal=0.5) as arm:
         recorder = Recorder(path, [segment])
         play(arm, 5)
@@ -264,8 +258,7 @@ def test_entries_that_were_overwritten_are_a_gap(segment: str, tmp_path: Path) -
     assert [(entry.number, entry.kind, entry.id) for entry in entries][-len(numbers) :] == numbers
 
 
-def test_decisions_without_a_row_after_them_are_recorded(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_decisions_without_a_row_after_them_are_recorded(segment: str, path: Path) -> None:
     with o80.Backend(segment, ["a"]) as backend:
         backend.publish()
         with o80.Frontend(segment) as frontend, o80.Recording(path, segment) as recording:

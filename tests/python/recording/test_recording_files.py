@@ -30,11 +30,10 @@ CUTS = 30
 
 @pytest.fixture
 def recorded(
-    arm: o80.Frontend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    arm: o80.Frontend, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> tuple[Path, o80.History]:
     """A file of 10 chunks of 20 rows, each before one of their joint states, and the rows."""
     monkeypatch.setattr("o80.recording.file_writer.LARGE", 0)
-    path = tmp_path / "run.mcap"
     recorder = Recorder(path, [arm.segment])
     for i in range(10):
         arm.add_command("elbow", 0.1 * i, iterations=20)
@@ -46,9 +45,9 @@ def recorded(
 
 @pytest.mark.parametrize("moved", [True, False])
 def test_a_file_that_loses_its_name_while_it_is_written_is_not_lost(
-    arm: o80.Frontend, tmp_path: Path, moved: bool
+    arm: o80.Frontend, path: Path, moved: bool
 ) -> None:
-    path, other = tmp_path / "run.mcap", tmp_path / "moved.mcap"
+    other = path.with_name("moved.mcap")
     recorder = Recorder(path, [arm.segment])
     arm.burst(20)
     recorder.poll()
@@ -74,8 +73,7 @@ def rows_in(path: Path, arm: o80.Frontend) -> int:
         return sum(1 for _ in reader.iter_messages([topic_of(arm.segment)]))
 
 
-def test_joint_states_may_be_left_out(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_joint_states_may_be_left_out(arm: o80.Frontend, path: Path) -> None:
     with o80.Recording(path, arm, joint_states=False):
         arm.add_command("elbow", 0.5, iterations=20)
         arm.burst(50)
@@ -147,8 +145,8 @@ def test_a_copy_of_another_program_is_replayed(
     assert [*o80.open(part)] == []
 
 
-def test_what_a_copy_lacks_is_named(segment: str, tmp_path: Path) -> None:
-    path, copy = tmp_path / "run.mcap", tmp_path / "copy.mcap"
+def test_what_a_copy_lacks_is_named(segment: str, path: Path) -> None:
+    copy = path.with_name("copy.mcap")
     with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm):
         arm.burst(100)
     copied(copy, path, others=False)
@@ -163,10 +161,10 @@ FORMS = [("zstd", None, 0), ("lz4", "10k", 5000), ("none", "20k", 1 << 18)]  # L
 
 
 @pytest.fixture(params=FORMS, ids=str)
-def everything(request: pytest.FixtureRequest, segment: str, tmp_path: Path) -> Path:
+def everything(request: pytest.FixtureRequest, segment: str, path: Path) -> Path:
     """Two robots, one with two runs: commands, halts, a reset, marks of both kinds, transforms."""
     load = o80.robots.load("two_joints").inline
-    path, second = tmp_path / "run.mcap", f"{segment}-b"
+    second = f"{segment}-b"
     compression, split, large = request.param
     request.getfixturevalue("monkeypatch").setattr("o80.recording.file_writer.LARGE", large)
     form = {"compression": compression, "split": split}
@@ -190,7 +188,7 @@ def everything(request: pytest.FixtureRequest, segment: str, tmp_path: Path) -> 
             recording.flush()
             recording._recorder.sources[second]._attempt_at = 0.0  # now
     o80.clean(second)
-    cut(path, tmp_path / "shown.mcap", transforms=60.0)
+    cut(path, path.with_name("shown.mcap"), transforms=60.0)
     return path
 
 
@@ -320,13 +318,12 @@ def test_all_that_a_recording_holds_is_read_by_rerun(everything: Path, tmp_path:
 
 
 def test_decisions_that_cannot_be_told_in_words_are_recorded_all_the_same(
-    arm: o80.Frontend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    arm: o80.Frontend, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def newer(*_: Any) -> str:
         raise LookupError("request 999")
 
     monkeypatch.setattr("o80.recording.log_channel.status_text", newer)
-    path = tmp_path / "run.mcap"
     with o80.Recording(path, arm):
         arm.add_command("elbow", 0.5, iterations=20)
         arm.burst(30)
@@ -335,10 +332,9 @@ def test_decisions_that_cannot_be_told_in_words_are_recorded_all_the_same(
     assert any("cannot be shown as text: request 999" in line.msg for _, line in lines)
 
 
-def test_names_with_one_topic_are_not_recorded_together(segment: str, tmp_path: Path) -> None:
+def test_names_with_one_topic_are_not_recorded_together(segment: str, path: Path) -> None:
     near = segment.replace("-", "_")
     load = o80.robots.load("two_joints").inline
-    path = tmp_path / "run.mcap"
     with load(segment), load(near):
         with pytest.raises(o80.RecordingError, match="rename one") as refused:
             Recorder(path, [segment, near])
@@ -374,9 +370,8 @@ def test_wherever_it_is_cut_whole_chunks_are_read_and_continued(
 
 
 def test_the_last_rows_and_decisions_are_read_from_the_last_chunks(
-    arm: o80.Frontend, tmp_path: Path
+    arm: o80.Frontend, path: Path
 ) -> None:
-    path = tmp_path / "run.mcap"
     recorder = Recorder(path, [arm.segment])
     for i in range(10):
         if i in (2, 4, 5):
@@ -449,9 +444,8 @@ def record_for_ever(arm: o80.Frontend, recorder: Recorder) -> None:
 
 
 def test_a_full_disk_ends_in_an_error_and_a_file_that_readers_open(
-    arm: o80.Frontend, tmp_path: Path
+    arm: o80.Frontend, path: Path
 ) -> None:
-    path = tmp_path / "run.mcap"
     recorder = Recorder(path, [arm.segment], form=Form("none"))
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (250_000, limits[1]))

@@ -107,11 +107,11 @@ def record(path: Path, segment: str) -> Path:
 
 
 @pytest.fixture
-def newer(segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def newer(segment: str, path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A recording whose journal is in a newer version of the format."""
     with monkeypatch.context() as forged:
         forged.setattr(_core, "JOURNAL_CODEC", NEWER)
-        return record(tmp_path / "run.mcap", segment)
+        return record(path, segment)
 
 
 SAID = f"version {NEWER} .* reads version {_core.JOURNAL_CODEC}: read it with a newer o80"
@@ -140,9 +140,8 @@ def test_commands_tell_a_newer_version(newer: Path) -> None:
 
 
 def test_a_journal_of_another_version_is_not_continued(
-    segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    segment: str, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "run.mcap"
     with o80.robots.load("two_joints").inline(segment) as arm:
         with monkeypatch.context() as forged:
             forged.setattr(_core, "JOURNAL_CODEC", NEWER)
@@ -164,11 +163,11 @@ def test_a_journal_of_another_version_is_not_continued(
 
 @pytest.mark.parametrize("codec", ["", "one", "-1", "1e3", "9" * 30])
 def test_a_damaged_version_is_told(
-    codec: str, segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    codec: str, segment: str, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as forged:
         forged.setattr(_core, "JOURNAL_CODEC", codec)
-        path = record(tmp_path / "run.mcap", segment)
+        record(path, segment)
     with pytest.raises(o80.RecordingError):
         o80.open(path)[segment].epochs[0].journal()
     told("info", path, code=1)
@@ -190,7 +189,7 @@ def with_later_kind(content: bytes) -> bytes:
 
 
 def test_what_a_newer_o80_recorded_is_listed_and_ends_a_replay(
-    segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    segment: str, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     honest, what = Entries.message, f"entry kind {LATER}"
 
@@ -199,7 +198,7 @@ def test_what_a_newer_o80_recorded_is_listed_and_ends_a_replay(
 
     with monkeypatch.context() as forging:
         forging.setattr(Entries, "message", forged)
-        path = record(tmp_path / "run.mcap", segment)
+        record(path, segment)
     entries = o80.open(path)[segment].epochs[0].journal()
     (unknown,) = (each for each in entries if each.unknown)
 
@@ -233,10 +232,8 @@ def record_limited(path: Path, segment: str, profile: ProfileWord = "linear") ->
     return path
 
 
-def test_a_recording_says_under_which_motion_rules_it_was_made(
-    segment: str, tmp_path: Path
-) -> None:
-    path = record_limited(tmp_path / "run.mcap", segment)
+def test_a_recording_says_under_which_motion_rules_it_was_made(segment: str, path: Path) -> None:
+    record_limited(path, segment)
 
     (epoch,) = o80.open(path)[segment].epochs
     assert epoch.provenance.motion_rules == _core.MOTION_RULES
@@ -248,10 +245,10 @@ def test_a_recording_says_under_which_motion_rules_it_was_made(
 
 @pytest.mark.parametrize("other", [_core.MOTION_RULES - 1, _core.MOTION_RULES + 1])
 def test_under_other_rules_rows_are_compared_up_to_the_first_command_that_they_change(
-    other: int, segment: str, tmp_path: Path, forged: dict[str, Any]
+    other: int, segment: str, path: Path, forged: dict[str, Any]
 ) -> None:
     forged["motion_rules"] = other
-    path = record_limited(tmp_path / "run.mcap", segment)
+    record_limited(path, segment)
     (run,) = o80.replay(path)
 
     assert run.difference is None
@@ -265,10 +262,10 @@ def test_under_other_rules_rows_are_compared_up_to_the_first_command_that_they_c
 
 
 def test_rules_that_change_no_command_of_the_run_are_noted(
-    segment: str, tmp_path: Path, forged: dict[str, Any]
+    segment: str, path: Path, forged: dict[str, Any]
 ) -> None:
     forged["motion_rules"] = 77
-    path = record(tmp_path / "run.mcap", segment)
+    record(path, segment)
     (run,) = o80.replay(path)
 
     assert run.identical, run

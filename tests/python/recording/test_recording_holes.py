@@ -106,9 +106,8 @@ def test_a_repaired_recording_lacks_its_end(
 
 
 def test_a_run_that_is_recorded_late_is_not_whole(
-    segment: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    segment: str, path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = tmp_path / "run.mcap"
     with o80.robots.load("two_joints").inline(segment, history=16) as arm:
         arm.burst(100)
         recorder = Recorder(path, [segment])
@@ -134,8 +133,7 @@ def test_a_run_that_is_recorded_late_is_not_whole(
     assert f"up to row {last}; then rows {last + 1} to {oldest - 1} are missing" in str(run)
 
 
-def test_a_file_that_is_missing_in_a_folder_is_a_gap(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_a_file_that_is_missing_in_a_folder_is_a_gap(arm: o80.Frontend, path: Path) -> None:
     with o80.Recording(path, arm, split="1k") as recording:
         for _ in range(3):
             arm.burst(20)
@@ -161,9 +159,11 @@ def test_a_file_that_is_missing_in_a_folder_is_a_gap(arm: o80.Frontend, tmp_path
     assert epoch.gaps == [Gap(0, lost[1], EARLIER_FILE)]
 
 
-def test_a_backend_that_was_killed_is_recorded_to_its_end(segment: str, tmp_path: Path) -> None:
+def test_a_backend_that_was_killed_is_recorded_to_its_end(
+    segment: str, path: Path, tmp_path: Path
+) -> None:
     with o80.robots.load("two_joints").start(segment, bursting=True) as process:
-        recorder = Recorder(tmp_path / "run.mcap", [segment])
+        recorder = Recorder(path, [segment])
         with process.frontend() as robot:
             robot.burst(7)
         os.kill(process.pid, signal.SIGKILL)
@@ -174,7 +174,7 @@ def test_a_backend_that_was_killed_is_recorded_to_its_end(segment: str, tmp_path
     for name in ("run", "saved"):
         (epoch,) = o80.open(tmp_path / f"{name}.mcap")[segment].epochs
         assert (epoch.rows, epoch.end, epoch.gaps) == (8, "killed", [])
-    shutil.copy(tmp_path / "run.mcap", tmp_path / "again.mcap")
-    merge([tmp_path / "run.mcap", tmp_path / "again.mcap"], tmp_path / "both.mcap")
+    shutil.copy(path, tmp_path / "again.mcap")
+    merge([path, tmp_path / "again.mcap"], tmp_path / "both.mcap")
     (epoch,) = o80.open(tmp_path / "both.mcap")[segment].epochs
     assert (epoch.rows, epoch.end, epoch.gaps) == (8, "killed", [])

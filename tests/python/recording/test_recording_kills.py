@@ -63,10 +63,9 @@ def recorded_iterations(path: Path, name: str) -> "np.ndarray[tuple[int], np.dty
 @pytest.mark.timeout(300 + KILLS // 2)
 @pytest.mark.parametrize("split", [None, "30k"])
 def test_nothing_is_lost_and_nothing_is_written_twice(
-    split: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    split: str | None, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("o80.recording.file_writer.LARGE", 0)  # two chunks in each poll
-    path = tmp_path / "run.mcap"
     chance = random.Random(7)
     start, rows = o80.robots.load("two_joints").start, 200_000 + 200 * KILLS
     with start(frequency=1000, history=rows, journal=64) as process, process.frontend() as robot:

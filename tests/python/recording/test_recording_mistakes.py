@@ -66,9 +66,8 @@ def test_what_cannot_be_recorded_is_refused_and_leaves_no_file(
     ],
 )
 def test_what_is_there_is_not_written_to(
-    content: bytes | None, options: dict[str, Any], said: str, tmp_path: Path
+    content: bytes | None, options: dict[str, Any], said: str, path: Path
 ) -> None:
-    path = tmp_path / "run.mcap"
     path.mkdir() if content is None else path.write_bytes(content)
     with pytest.raises(o80.RecordingError, match=said):
         Recorder(path, ["arm"], **options)
@@ -78,13 +77,13 @@ def test_what_is_there_is_not_written_to(
             o80.open(path)
 
 
-def test_a_wrong_name_of_a_segment_leaves_no_file(tmp_path: Path) -> None:
+def test_a_wrong_name_of_a_segment_leaves_no_file(path: Path, tmp_path: Path) -> None:
     for split in (None, "1M"):
         with pytest.raises(o80.Error, match="'two/joints' cannot name a segment"):
-            o80.Recording(tmp_path / "run.mcap", ["two/joints"], split=split)
+            o80.Recording(path, ["two/joints"], split=split)
     with pytest.raises(o80.InvalidArgument, match="at least one segment"):
-        o80.Recording(tmp_path / "run.mcap", [])
-    said = refused("save", "nobody-*", "-o", tmp_path / "run.mcap")
+        o80.Recording(path, [])
+    said = refused("save", "nobody-*", "-o", path)
     assert "no segment matches 'nobody-*'" in said
     assert not list(tmp_path.iterdir())
 
@@ -92,8 +91,7 @@ def test_a_wrong_name_of_a_segment_leaves_no_file(tmp_path: Path) -> None:
 # ---------------------------------------------------------------------- two recorders
 
 
-def test_a_file_has_one_recorder(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_a_file_has_one_recorder(arm: o80.Frontend, path: Path) -> None:
     with o80.Recording(path, arm) as recording:
         arm.burst(10)
         recording.flush()
@@ -106,9 +104,9 @@ def test_a_file_has_one_recorder(arm: o80.Frontend, tmp_path: Path) -> None:
 
 
 def test_a_forked_child_that_drops_its_copy_of_a_recording_says_nothing(
-    arm: o80.Frontend, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    arm: o80.Frontend, path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    held = [o80.Recording(tmp_path / "run.mcap", arm.segment)]
+    held = [o80.Recording(path, arm.segment)]
     child = os.fork()
     if child == 0:
         held.clear()  # the last reference
@@ -120,9 +118,8 @@ def test_a_forked_child_that_drops_its_copy_of_a_recording_says_nothing(
 
 
 def test_a_forked_child_does_not_keep_the_file_of_a_killed_recorder(
-    arm: o80.Frontend, tmp_path: Path
+    arm: o80.Frontend, path: Path
 ) -> None:
-    path = tmp_path / "run.mcap"
     theirs, ours = os.pipe()
     told, tells = os.pipe()
     recorder_process = os.fork()
@@ -145,7 +142,9 @@ def test_a_forked_child_does_not_keep_the_file_of_a_killed_recorder(
             os.close(end)
 
 
-def test_a_recording_that_is_open_when_its_program_ends_is_finished(tmp_path: Path) -> None:
+def test_a_recording_that_is_open_when_its_program_ends_is_finished(
+    path: Path, tmp_path: Path
+) -> None:
     program = (
         "import o80\n"
         "arm = o80.robots.load('two_joints').inline()\n"
@@ -154,7 +153,7 @@ def test_a_recording_that_is_open_when_its_program_ends_is_finished(tmp_path: Pa
         "arm.burst(40)\n"
     )
     run_python("-c", program)
-    file = o80.open(tmp_path / "run.mcap")
+    file = o80.open(path)
     (segment,) = file.segments.values()
 
     assert file.finished
@@ -162,10 +161,10 @@ def test_a_recording_that_is_open_when_its_program_ends_is_finished(tmp_path: Pa
 
 
 def test_the_end_of_a_recording_does_not_wait_for_rows_published_after_it(
-    arm: o80.Frontend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    arm: o80.Frontend, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(source, "LARGEST_BLOCK", 1)  # one row in a poll: never up to date
-    recorder = Recorder(tmp_path / "run.mcap", [arm.segment])
+    recorder = Recorder(path, [arm.segment])
     arm.burst(10)
     polls = itertools.count()
     poll = recorder.poll
@@ -185,8 +184,7 @@ def test_the_end_of_a_recording_does_not_wait_for_rows_published_after_it(
 # ---------------------------------------------------------------------- marks
 
 
-def test_marks_hold_numbers_and_arrays_of_numpy(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_marks_hold_numbers_and_arrays_of_numpy(arm: o80.Frontend, path: Path) -> None:
     with o80.Recording(path, arm) as recording:
         recording.mark("end", name="ball", hits=np.int64(3), target=np.zeros(2), won=np.True_)
         with pytest.raises(TypeError, match="that JSON can hold"):
@@ -200,8 +198,7 @@ def test_marks_hold_numbers_and_arrays_of_numpy(arm: o80.Frontend, tmp_path: Pat
 # ---------------------------------------------------------------------- damaged files
 
 
-def test_a_length_beyond_all_memory_is_a_recording_error(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_a_length_beyond_all_memory_is_a_recording_error(arm: o80.Frontend, path: Path) -> None:
     with o80.Recording(path, arm):
         arm.burst(20)
     attachment = scan(path).attachments[0]
@@ -229,9 +226,8 @@ def test_an_export_or_a_plot_that_cannot_be_written_is_refused(recorded: Path) -
 
 
 def test_a_sensor_without_actuators_is_recorded_plotted_and_exported(
-    segment: str, tmp_path: Path
+    segment: str, path: Path, tmp_path: Path
 ) -> None:
-    path = tmp_path / "run.mcap"
     with o80.Backend(segment, extended={"force": float}, bursting=True) as sensor:
         sensor.publish(None, {"force": 1.5})
         o80.Recording(path, segment).close()

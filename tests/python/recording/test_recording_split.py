@@ -55,8 +55,7 @@ def test_a_folder_of_complete_files_is_read_as_one(arm: o80.Frontend, tmp_path: 
     assert sum(o80.open(file)[arm.segment].epochs[0].rows for file in files) == epoch.rows == 601
 
 
-def test_files_end_after_a_time(process: o80.robots.Process, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_files_end_after_a_time(process: o80.robots.Process, path: Path) -> None:
     with process.frontend() as arm, o80.Recording(path, arm, split="0.05s") as recording:
         until(lambda: len(list(path.iterdir())) >= 4)
         recording.mark("end")
@@ -102,8 +101,7 @@ def bytes_in(folder: Path) -> int:
     return sum(file.stat().st_size for file in folder.iterdir())
 
 
-def test_the_oldest_files_without_a_mark_are_deleted(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_the_oldest_files_without_a_mark_are_deleted(arm: o80.Frontend, path: Path) -> None:
     recorder = Recorder(path, [arm.segment], split="8k", keep="220k")
     play(arm, recorder, 12)
     marked = recorder.file.path
@@ -124,9 +122,8 @@ def test_the_oldest_files_without_a_mark_are_deleted(arm: o80.Frontend, tmp_path
 
 
 def test_files_that_are_deleted_while_they_are_read_do_no_harm(
-    arm: o80.Frontend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    arm: o80.Frontend, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "run.mcap"
     recorder = Recorder(path, [arm.segment], split="8k")
     play(arm, recorder, 12)
     arm.mark("of a frontend")

@@ -196,8 +196,7 @@ def file_of(path: Path, arm: o80.Frontend) -> Path:
     return path
 
 
-def test_each_run_of_each_segment_is_replayed(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_each_run_of_each_segment_is_replayed(segment: str, path: Path) -> None:
     with o80.Recording(path, [segment, f"{segment}-b"]) as recording:
         for number, gain in enumerate((5.0, 9.0)):
             load = o80.robots.load("two_joints")
@@ -280,8 +279,8 @@ def test_another_machine_is_noted(run_in_file: FileRun) -> None:
     assert any("glibc 2.1 recorded it" in note for note in report.notes)
 
 
-def test_the_command_says_whether_a_recording_repeats(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = file_of(tmp_path / "run.mcap", arm)
+def test_the_command_says_whether_a_recording_repeats(arm: o80.Frontend, path: Path) -> None:
+    file_of(path, arm)
     done = run_o80("replay", path)
     assert done.stderr == ""
     assert f"{arm.segment}: {arm.published + 1} rows, identical" in done.stdout

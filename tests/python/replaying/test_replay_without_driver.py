@@ -104,10 +104,9 @@ def test_it_does_not_begin_between_a_purge_and_a_batch_that_it_still_purges(segm
 
 
 def test_a_recording_that_begins_late_is_replayed_from_where_nothing_acts(
-    segment: str, tmp_path: Path
+    segment: str, path: Path
 ) -> None:
     """It moved before, and its first rows were overwritten."""
-    path = tmp_path / "run.mcap"
     with o80.robots.load("two_joints").inline(segment, history=64) as arm:
         arm.add_command("elbow", 0.5, iterations=20)
         arm.burst(300)
@@ -240,8 +239,7 @@ class Limp:
 
 
 @pytest.mark.parametrize("kind", ["set-points", "commands", "trajectories", "chunks", "anything"])
-def test_nothing_drifts_while_a_driver_follows_and_interrupts(kind: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_nothing_drifts_while_a_driver_follows_and_interrupts(kind: str, path: Path) -> None:
     choose = random.Random(kind)
 
     def send(arm: o80.Frontend, what: str) -> None:

@@ -28,8 +28,7 @@ def look(url: str) -> dict[str, Any]:
         return found
 
 
-def test_a_view_shows_frontends_names_and_recordings(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_a_view_shows_frontends_names_and_recordings(arm: o80.Frontend, path: Path) -> None:
     with o80.Recording(path, arm):
         arm.burst(10)
     shown: list[Any] = [[arm, path], arm.segment, o80.open(path)]

@@ -192,8 +192,7 @@ def wait_for(
     return until(lambda: answer if ready(answer := look(**requested)) else {})
 
 
-def test_marks_stand_in_the_curves(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_marks_stand_in_the_curves(segment: str, path: Path) -> None:
     live = looks_at(segment)
     with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm):
         arm.burst(100)
@@ -318,10 +317,7 @@ def test_robots_that_have_a_thing_at_one_place_stand_in_one_scene(segment: str) 
         assert look(source=names[3])["others"][names[0]]["shares"]
 
 
-def test_in_simulated_time_marks_say_which_rows_belong_together(
-    segment: str, tmp_path: Path
-) -> None:
-    path = tmp_path / "run.mcap"
+def test_in_simulated_time_marks_say_which_rows_belong_together(segment: str, path: Path) -> None:
     load = o80.robots.load("two_joints")
     names = [f"{segment}-{number}" for number in range(2)]
     with (

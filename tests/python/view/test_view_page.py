@@ -265,10 +265,7 @@ def test_another_robot_that_takes_the_name_is_shown_anew(browser: Chromium, segm
             assert page.value("page.scene.canvas.hidden")
 
 
-def test_a_recording_is_played_and_scrubbed(
-    browser: Chromium, segment: str, tmp_path: Path
-) -> None:
-    path = tmp_path / "run.mcap"
+def test_a_recording_is_played_and_scrubbed(browser: Chromium, segment: str, path: Path) -> None:
     with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, segment):
         arm.add_command("elbow", 1.0, iterations=2000)
         arm.burst(4000)
