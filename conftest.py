@@ -11,10 +11,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from sources import all_left_to_check
 
 os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", "build/hypothesis")
+# an example may take as long as a slow machine needs
+settings.register_profile("o80", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("o80")
 # a run in the background may have been started with interrupts ignored, and would pass it on
 signal.signal(signal.SIGINT, signal.default_int_handler)
 

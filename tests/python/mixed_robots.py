@@ -7,7 +7,7 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from hypothesis import HealthCheck, Phase, settings
+from hypothesis import Phase, settings
 from hypothesis import strategies as st
 
 import o80
@@ -115,7 +115,5 @@ def recorded(groups: Any, sensors: Any, seed: int, rows: int = 5) -> o80.History
 # each example starts a backend: shrinking would exceed a test's timeout
 ROBOTS = settings(
     max_examples=12,
-    deadline=None,
     phases=[Phase.explicit, Phase.reuse, Phase.generate],
-    suppress_health_check=[HealthCheck.too_slow],
 )

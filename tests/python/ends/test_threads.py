@@ -290,6 +290,6 @@ def test_a_handler_may_close_its_backend_but_not_publish(segment: str) -> None:
 
 def test_all_of_this_holds_where_python_watches_itself() -> None:
     watched = ["-X", "dev", "-X", "faulthandler", "-m", "pytest", "-q", __file__]
-    run = run_python(*watched, "-k", "shared or closing or BackendKilled or handler", timeout=120)
+    run = run_python(*watched, "-k", "shared or closing or BackendKilled or handler", timeout=250)
 
     assert "Fatal" not in run.stderr

@@ -237,7 +237,7 @@ class Mirrored:
             self.partners[row] = seen.iteration
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.lists(st.tuples(st.integers(0, 7), st.integers(1, 4)), min_size=1, max_size=12))
 def test_rows_of_a_twin_meet_the_rows_by_which_it_was_commanded(
     tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[int, int]]

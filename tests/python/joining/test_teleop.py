@@ -139,7 +139,7 @@ def test_scale_and_offset_and_near(segment: str, hand: o80.Frontend, arm: o80.Fr
     assert arm.latest().observed[1] == pytest.approx(0.4)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     scale=st.floats(0.01, 200).flatmap(lambda size: st.sampled_from([size, -size])),
     offset=st.floats(-1, 1),
@@ -413,12 +413,13 @@ def test_the_command_marks_demonstrations_by_keys(segment: str, path: Path) -> N
     robot = o80.robots.load("two_joints")
     main, side = pty.openpty()
     words = ["o80", "teleop", one, other, "--task", "wave", "--silence", "60"]
+    words += ["--near", "1"]  # no jump, however late a busy machine reads the hand
     with (
         robot.start(one, frequency=200) as leads,
         robot.start(other, frequency=200) as follows,
         leads.frontend() as hand,
         follows.frontend() as arm,
-        o80.Recording(path, arm) as recording,
+        o80.Recording(path, arm),
         subprocess.Popen(words, stdin=side, stdout=subprocess.PIPE, stderr=side) as command,
     ):
         os.close(side)
@@ -440,12 +441,14 @@ def test_the_command_marks_demonstrations_by_keys(segment: str, path: Path) -> N
             arm.add_command("elbow", 0.0)
             with pytest.raises(o80.NotCompleted, match="exclusive control"):
                 arm.pulse_and_wait(timeout=60)
-            for thrown_away in (False, True):
+            for number, place, key in ((1, 0.5, " "), (2, 0.0, "x")):
                 press(" ")
-                until("demonstration 1" if not thrown_away else "demonstration 2")
-                hand.add_command("elbow", 0.0 if thrown_away else 0.5, duration=0.5)
+                until(f"demonstration {number}")
+                hand.add_command("elbow", place, duration=0.5)
                 hand.pulse_and_wait(timeout=60)
-                press("x" if thrown_away else " ")
+                while abs(arm.latest().observed[1] - place) > 0.1:
+                    arm.wait_for_next(timeout=60)
+                press(key)
                 until("1 demonstration")
             press("q")
             assert command.stdout is not None
@@ -454,8 +457,6 @@ def test_the_command_marks_demonstrations_by_keys(segment: str, path: Path) -> N
         finally:
             command.kill()
             os.close(main)
-        recording.flush()
-        assert arm.latest().desired[1] == pytest.approx(0.0, abs=0.2)
     assert said.startswith("1 demonstration; delay from hand to motor")
     episodes = episodes_of(o80.open(path))
     (kept,) = episodes.all

@@ -12,7 +12,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mixed_robots import Mode, recorded
 
@@ -249,7 +249,6 @@ def old() -> Iterator[o80.Frontend]:
 TIMES = st.integers(-5 * MILLISECOND, 105 * MILLISECOND)
 
 
-@settings(deadline=None)
 @given(TIMES)
 def test_the_row_at_a_time_is_the_newest_at_or_before_it(old: o80.Frontend, time: int) -> None:
     history = old.history()
@@ -262,7 +261,6 @@ def test_the_row_at_a_time_is_the_newest_at_or_before_it(old: o80.Frontend, time
                 source.at_time(time)
 
 
-@settings(deadline=None)
 @given(
     st.one_of(st.none(), TIMES),
     st.one_of(st.none(), TIMES),
@@ -286,7 +284,6 @@ def test_rows_between_times_are_those_that_numpy_finds(
         assert rows.iteration.tolist() == history.iteration[wanted].tolist()
 
 
-@settings(deadline=None)
 @given(st.floats(0, 0.2))
 def test_the_last_seconds_count_from_the_newest_row(old: o80.Frontend, seconds: float) -> None:
     history = old.history()
@@ -298,7 +295,6 @@ def test_the_last_seconds_count_from_the_newest_row(old: o80.Frontend, seconds: 
     assert old.history(n).iteration.tolist() == history.select(n).iteration.tolist()
 
 
-@settings(deadline=None)
 @given(st.integers(0, 40), st.integers(1, 7), TIMES)
 def test_a_part_of_a_history_is_a_history(old: o80.Frontend, n: int, step: int, time: int) -> None:
     part = old.history()[::step]
