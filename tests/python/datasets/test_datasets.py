@@ -186,12 +186,17 @@ def test_episodes_of_restarted_robots_are_those_of_their_run(segment: str, tmp_p
                 rows += count + 1
                 while recording._recorder.newest[segment] != 0 or not recording.rows:
                     recording.flush()
+                recording.mark("episode_end", reward=1.0)  # of no episode of this run
                 recording.mark("episode", run=run)
                 arm.burst(count)
                 while recording.rows < rows:
                     recording.flush()
-    found = episodes(path)
-    assert [(each.values["run"], len(each)) for each in found.all] == [(0, 10), (1, 20)]
+        recording.mark("episode_end", reward=2.0)
+    found = [
+        (each.values["run"], len(each), each.terminated, each.rewards.sum())
+        for each in episodes(path).all
+    ]
+    assert found == [(0, 10, False, 0.0), (1, 20, True, 2.0)]
 
 
 def test_a_recording_without_episodes_is_refused(arm: o80.Frontend, tmp_path: Path) -> None:
