@@ -12,7 +12,7 @@ import numpy as np
 from mcap.records import Channel, ChunkIndex
 
 from o80.base.errors import RecordingError
-from o80.base.unwritable import reason
+from o80.base.unwritable import writing
 from o80.recording.blocks import Block
 from o80.recording.epoch import GAP, OVERWRITTEN, EpochNote, channels_of, iteration_in
 from o80.recording.file_writer import JOINT_STATES, FileWriter
@@ -67,22 +67,19 @@ def write_part(
     )
     file = opened(output, proceed=False)
     try:
-        writer = _PartWriter(file, selection, offsets)
-        for run, epoch in _epochs_in(read):
-            writer.runs[run] = epoch, poses(run[0], epoch) if selection.transforms else None
-        for path, found in chain.from_iterable(in_order):
-            with found.opened(path) as content:
-                try:
-                    writer.add(content, found)
-                except (ValueError, LookupError, struct.error) as error:
-                    raise RecordingError(f"{path} is damaged: {error!r:.200}") from error
-        for run, epoch in _epochs_in(read):
-            writer.add_end(run, epoch)
-        file.finish()
-    except OSError as error:
-        file.close()
-        output.unlink(missing_ok=True)
-        raise RecordingError(f"{output} cannot be written: {reason(output, error)}") from error
+        with writing(output, RecordingError):
+            writer = _PartWriter(file, selection, offsets)
+            for run, epoch in _epochs_in(read):
+                writer.runs[run] = epoch, poses(run[0], epoch) if selection.transforms else None
+            for path, found in chain.from_iterable(in_order):
+                with found.opened(path) as content:
+                    try:
+                        writer.add(content, found)
+                    except (ValueError, LookupError, struct.error) as error:
+                        raise RecordingError(f"{path} is damaged: {error!r:.200}") from error
+            for run, epoch in _epochs_in(read):
+                writer.add_end(run, epoch)
+            file.finish()
     except BaseException:
         file.close()
         output.unlink(missing_ok=True)

@@ -21,7 +21,7 @@ from o80.recording.blocks import messages_in
 from o80.recording.epoch import GAP, OVERWRITTEN, Gap, Interruption, iteration_in
 from o80.recording.epoch_part import EpochPart
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
-from o80.recording.journal_channel import Entries, codec_of, entries_in
+from o80.recording.journal_channel import Entries, codec_of
 from o80.recording.message_plan import Bytes, Copy, MessagePlan
 from o80.recording.message_types import row_type
 from o80.recording.scan import content_of, index_of
@@ -77,26 +77,15 @@ class RecordedEpoch(Histories):
         """parts: in order, at least one. lacks_end: why no record states how the run ended."""
         self._parts = parts
         self._lacks_end = lacks_end
-        self._note = parts[0].note
+        self._note = note = parts[0].note
+        self.epoch = note.epoch  #: number of the run; see `Frontend.epoch`
+        self.first_row = note.begin  #: iteration of the first recorded row
+        self.wall_offset = note.wall_offset  #: wall-clock time [ns since 1970] minus row time
+        self.boot = note.boot  #: id of the boot whose clock the row times use; empty: unknown
 
     @property
     def _run(self) -> "RecordedEpoch":
         return self
-
-    @property
-    def epoch(self) -> int:
-        """The number of the run; see `Frontend.epoch`."""
-        return self._note.epoch
-
-    @property
-    def wall_offset(self) -> int:
-        """Wall-clock time [ns since 1970] minus row time."""
-        return self._note.wall_offset
-
-    @property
-    def boot(self) -> str:
-        """Id of the boot whose monotonic clock the row times use; empty: unknown."""
-        return self._note.boot
 
     @property
     def rows(self) -> int:
@@ -365,11 +354,6 @@ class RecordedEpoch(Histories):
         return rows
 
     @property
-    def first_row(self) -> int:
-        """Iteration of the first recorded row."""
-        return self._note.begin
-
-    @property
     def end(self) -> str:
         """How the run ended: "stopped", "killed", "superseded", or "failed: " with the reason.
 
@@ -387,14 +371,10 @@ class RecordedEpoch(Histories):
         return (found[-1][0][0], found[-1][1]) if found else (-1, {})
 
     def _end_in_journal(self) -> str:
-        part = next((part for part in reversed(self._parts) if part.journal is not None), None)
         codec = self.journal_codec
-        if part is None or codec is None or codec > _core.JOURNAL_CODEC:
+        if codec is None or codec > _core.JOURNAL_CODEC:
             return ""
-        last = part.last_entries()
-        if last is None:
-            return ""
-        entries = self._decoded(_core.RecordedJournal(self.description, 0), last)
+        entries = [*self.last_entries(1)]
         if not entries or entries[-1].kind != "ended":
             return ""
         return f"failed: {entries[-1].text}" if entries[-1].text else "stopped"
@@ -480,9 +460,7 @@ class RecordedEpoch(Histories):
         Raises RecordingError if this part of the file is damaged.
         """
         for part in reversed(self._parts) if newest_first else self._parts:
-            if part.journal is not None:
-                with part.reading() as file:
-                    yield from entries_in(file, part.found, part.journal, newest_first=newest_first)
+            yield from part.entries(newest_first=newest_first)
 
     def _decoded(self, native: _core.RecordedJournal, part: Entries) -> list[_core.JournalEntry]:
         try:

@@ -192,11 +192,9 @@ def test_episodes_of_restarted_robots_are_those_of_their_run(segment: str, tmp_p
                 while recording.rows < rows:
                     recording.flush()
         recording.mark("episode_end", reward=2.0)
-    found = [
-        (each.values["run"], len(each), each.terminated, each.rewards.sum())
-        for each in episodes(path).all
-    ]
-    assert found == [(0, 10, False, 0.0), (1, 20, True, 2.0)]
+    one, other = episodes(path).all
+    assert (one.values["run"], len(one), one.terminated, one.rewards.sum()) == (0, 10, False, 0)
+    assert (other.values["run"], len(other), other.rewards.sum()) == (1, 20, 2)
 
 
 def test_a_recording_without_episodes_is_refused(arm: o80.Frontend, tmp_path: Path) -> None:

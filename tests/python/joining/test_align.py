@@ -391,11 +391,11 @@ def test_wrong_arguments_of_a_delay_are_named(segment: str) -> None:
     value = (one, "extended.value")
     wrong: list[tuple[Any, float, str]] = [
         ((one, "extended.valeu"), 0.1, "Did you mean 'extended.value'"),
-        ((one, "extended.pair"), 0.1, "names 2 numbers"),
+        ((one, "extended.pair"), 0.1, "choose one of several"),
         (value, 0.5, "too little"),
         (value, float("nan"), "most must be"),
         ((one[:20], "extended.value"), 0.1, "at least 50 are needed"),
-        ((one, lambda rows: 0.0), 0.1, "one for each"),
+        ((one, lambda rows: 0.0), 0.1, "a number for each row"),
     ]
     for signal_of_one, most, text in wrong:
         with pytest.raises(o80.InvalidArgument, match=text):
