@@ -7,7 +7,6 @@ behind that group.
 import contextlib
 import os
 import shutil
-import struct
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,10 +14,10 @@ from pathlib import Path
 
 import lz4.frame
 import zstandard
-from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
     Channel,
+    Chunk,
     ChunkIndex,
     Header,
     Metadata,
@@ -29,7 +28,7 @@ from mcap.records import (
 import o80._core as _core
 from o80.base.errors import InvalidArgument, RecordingError
 from o80.recording.blocks import Block
-from o80.recording.chunks import HEAD, bytes_of
+from o80.recording.chunks import bytes_of
 from o80.recording.locked_file import LockedFile, reserve
 from o80.recording.scan import CUT, MAGIC, Scan, place_of, scan
 from o80.recording.summary import end_of_file, room_for_end
@@ -42,7 +41,6 @@ _COMPRESS: dict[str, Callable[[], Callable[[bytes], bytes]]] = {
     "lz4": lambda: lz4.frame.compress,
     "none": lambda: bytes,
 }
-CHUNK_HEAD = struct.Struct("<BQQQQI")
 
 
 @dataclass(frozen=True)
@@ -206,17 +204,9 @@ class FileWriter:
         compression = "" if self.form.compression == "none" else self.form.compression
         start = min(int(block.log_times.min()) for block in blocks)
         end = max(int(block.log_times.max()) for block in blocks)
-        named = compression.encode()
-        head = CHUNK_HEAD.pack(
-            Opcode.CHUNK,
-            CHUNK_HEAD.size - HEAD.size + 4 + len(named) + 8 + len(compressed),
-            start,
-            end,
-            len(content),
-            zlib.crc32(content),
+        chunk = bytes_of(
+            Chunk(compression, compressed, end, start, zlib.crc32(content), len(content))
         )
-        chunk = head + struct.pack("<I", len(named)) + named
-        chunk += struct.pack("<Q", len(compressed)) + compressed
         indexes, offsets, at = b"", {}, 0
         for block in blocks:
             offsets[block.channel] = self.size + len(chunk) + len(indexes)

@@ -20,7 +20,6 @@ from o80.frontend.frontend import Frontend
 from o80.joining.difference import Difference, RobotsDifferError, first_difference, same_bytes
 from o80.replaying.conditions import (
     TOLERANCE,
-    blended_columns,
     changes,
     other_arithmetic,
     reads_the_world,
@@ -38,6 +37,7 @@ from o80.replaying.start import (
     find_rest,
     find_start,
 )
+from o80.rows.actuators import blending
 from o80.rows.columns import columns_of
 from o80.rows.history import History
 
@@ -283,7 +283,7 @@ class RunReplay:
         )
         if self.robot or self.options:
             self._notes.append("the robot and the options that were given are not used")
-        if blended := blended_columns(self.run.schema):
+        if blended := [f"desired.{name}" for name in blending(self.run.schema)]:
             self.ignore = (*self.ignore, *blended)
             self._notes.append(
                 f"not compared, because code of the driver interpolates them: {', '.join(blended)}"
