@@ -65,33 +65,28 @@ def write_part(
             found.chunks.start + _largest(_shifts(found, offsets)) for _, found in files
         ),
     )
+    runs = [run for recording in read for run in recording.runs()]
     file = opened(output, proceed=False)
     try:
         with writing(output, RecordingError):
             writer = _PartWriter(file, selection, offsets)
-            for run, epoch in _epochs_in(read):
-                writer.runs[run] = epoch, poses(run[0], epoch) if selection.transforms else None
+            for name, _, epoch in runs:
+                bodies = poses(name, epoch) if selection.transforms else None
+                writer.runs[name, epoch.epoch] = epoch, bodies
             for path, found in chain.from_iterable(in_order):
                 with found.opened(path) as content:
                     try:
                         writer.add(content, found)
                     except (ValueError, LookupError, struct.error) as error:
                         raise RecordingError(f"{path} is damaged: {error!r:.200}") from error
-            for run, epoch in _epochs_in(read):
-                writer.add_end(run, epoch)
+            for name, _, epoch in runs:
+                writer.add_end((name, epoch.epoch), epoch)
             file.finish()
     except BaseException:
         file.close()
         output.unlink(missing_ok=True)
         raise
     return writer.rows
-
-
-def _epochs_in(recordings: Sequence[RecordingFile]) -> Iterator[tuple[Run, RecordedEpoch]]:
-    for recording in recordings:
-        for name in recording:
-            for epoch in recording[name].epochs:
-                yield (name, epoch.epoch), epoch
 
 
 def _notes_in(found: Scan) -> Iterator[EpochNote]:

@@ -85,6 +85,12 @@ class RecordingFile:
                 runs[max(bisect(begins, mark.time) - 1, 0)].append(mark)
         return runs
 
+    def runs(self, names: Iterable[str] | None = None) -> Iterator[tuple[str, int, RecordedEpoch]]:
+        """Yields segment, number and epoch of each run of these segments, or of all."""
+        for name in self.chosen(names):
+            for number, epoch in enumerate(self.segments[name].epochs):
+                yield name, number, epoch
+
     def chosen(self, names: Iterable[str] | None = None) -> list[str]:
         """Returns these segments, or all. Raises InvalidArgument for a segment that is missing."""
         for name in names or ():
@@ -205,7 +211,7 @@ class RecordedSegment(Histories):
         if len(self.epochs) != 1:
             raise InvalidArgument(
                 f"segment '{self.name}' has {len(self.epochs)} epochs, because its robot was "
-                f"restarted: choose one, for example .epochs[-1].history()"
+                f"restarted: choose one, for example recording['{self.name}'].epochs[-1]"
             )
         return self.epochs[0]
 

@@ -220,22 +220,14 @@ class RecordedEpoch(Histories):
         return self._started("machine", Machine.from_json)
 
     def _started(self, key: str, read: Callable[[str], T]) -> T:
+        part, record = self._parts[0], self._note.record("provenance")
+        found = [each.metadata for each in part.found.metadata if each.name == record]
+        if not found:
+            raise RecordingError(f"{part.path} does not say how '{self._note.segment}' was started")
         try:
-            return read(self._provenance_texts[key])
+            return read(found[0][key])
         except (KeyError, TypeError, ValueError, RecursionError) as error:
-            raise RecordingError(
-                f"{self._parts[0].path}: the record {self._note.record('provenance')} is damaged"
-            ) from error
-
-    @cached
-    def _provenance_texts(self) -> dict[str, str]:
-        for each in self._parts[0].found.metadata:
-            if each.name == self._note.record("provenance"):
-                texts: dict[str, str] = each.metadata
-                return texts
-        raise RecordingError(
-            f"{self._parts[0].path} does not say how '{self._note.segment}' was started"
-        )
+            raise RecordingError(f"{part.path}: the record {record} is damaged") from error
 
     @cached
     def _decoder(self) -> Any:
@@ -371,9 +363,6 @@ class RecordedEpoch(Histories):
         return (found[-1][0][0], found[-1][1]) if found else (-1, {})
 
     def _end_in_journal(self) -> str:
-        codec = self.journal_codec
-        if codec is None or codec > _core.JOURNAL_CODEC:
-            return ""
         entries = [*self.last_entries(1)]
         if not entries or entries[-1].kind != "ended":
             return ""
@@ -406,8 +395,12 @@ class RecordedEpoch(Histories):
     def last_entries(self, most: int) -> Iterator[_core.JournalEntry]:
         """Yields the newest entries, at least `most` or all of them, the newest chunk first.
 
-        Batches whose records are split over two chunks come without records. Raises RecordingError.
+        None if a newer o80 wrote the journal. Batches whose records are split over two chunks come
+        without records. Raises RecordingError.
         """
+        codec = self.journal_codec
+        if codec is None or codec > _core.JOURNAL_CODEC:
+            return
         for part in self.journal_parts(newest_first=True):
             found = self._decoded(_core.RecordedJournal(self.description, 0), part)
             yield from found

@@ -30,7 +30,6 @@ from mcap.records import (
     Chunk,
     ChunkIndex,
     Footer,
-    Header,
     Metadata,
     MetadataIndex,
     Schema,
@@ -72,17 +71,14 @@ class Scan:
     end: int = 0  #: end of the last whole group [bytes]
     finished: bool = False  #: the file has a summary and a footer
     summarized: bool = False  #: the summary is complete
-    library: str = ""
     #: messages outside of chunks, chunks without indexes or with channels of their own: another
     #: program has written them
     foreign: bool = False
     copy: "CopiedFile | None" = None  #: copy of a foreign file in the form of o80, scanned instead
 
     def take(self, opcode: int, stream: ReadDataStream) -> None:
-        """Notes a header, a schema or a channel; nothing else."""
-        if opcode == Opcode.HEADER:
-            self.library = Header.read(stream).library
-        elif opcode == Opcode.SCHEMA:
+        """Notes a schema or a channel; nothing else."""
+        if opcode == Opcode.SCHEMA:
             schema = Schema.read(stream)
             self.schemas[schema.id] = schema
         elif opcode == Opcode.CHANNEL:
@@ -226,9 +222,6 @@ def _summary(file: IO[bytes], size: int) -> Scan | None:
     for place in found.metadata_places:
         file.seek(place.offset + HEAD.size)
         found.metadata.append(Metadata.read(ReadDataStream(BytesIO(file.read(place.length)))))
-    file.seek(len(MAGIC))
-    opcode, length = HEAD.unpack(file.read(HEAD.size))
-    found.take(opcode, ReadDataStream(BytesIO(file.read(length))))
     return found
 
 
