@@ -140,7 +140,9 @@ class RecordedEpoch(Histories):
         last, texts = self.end_record
         why = texts.get("reason") or self._parts[-1].why_cut
         if last >= after:
-            return [*found, Gap(after, last, "the recorder ended before it had read them")]
+            every = self._parts[-1].every
+            unread = "the recorder ended before it had read them"
+            return [*found, Gap(after, last, unread if last >= after + every - 1 else _kept(every))]
         why = why or ("" if texts else self._lacks_end)
         if why and not self.end:
             return [*found, Gap(after, None, why)]
@@ -167,8 +169,8 @@ class RecordedEpoch(Histories):
                 after += last - first + 1
             if part.every > 1 and part.rows:
                 after = part.last_row + 1
-                reason = f"every {part.every}th row was kept"
-                found.append(Gap(part.note.begin + 1, after - 1, reason))
+                if part.rows > 1:
+                    found.append(Gap(part.note.begin + 1, after - 1, _kept(part.every)))
         return found, after
 
     @property
@@ -463,6 +465,10 @@ class RecordedEpoch(Histories):
 
     def __repr__(self) -> str:
         return f"<epoch of {self._note.segment}: {self.rows} rows>"
+
+
+def _kept(every: int) -> str:
+    return f"every {every}th row was kept"
 
 
 def _first_row(chunk: tuple[EpochPart, ChunkIndex]) -> int:

@@ -29,7 +29,6 @@ from o80.replaying.recorded_run import ROWS_AT_ONCE, LiveRun, RecordedRun, runs_
 from o80.replaying.report import ReplayReport, RunReport
 from o80.replaying.runner import OtherRobot, Runner, with_driver, without_driver
 from o80.replaying.start import (
-    Requests,
     SlotsKept,
     Start,
     find_fresh_start,
@@ -171,7 +170,7 @@ class RunReplay:
         # without a driver, a restored snapshot is read as any other row
         known = Start() if self._no_driver else start
         rules = self._motion_rules()
-        slots = SlotsKept(Requests(self.run.schema), known)
+        slots = SlotsKept(self.run.schema, known)
         feed = EntryFeed(self.run.entries(), start, slots, rules)
         blocks = self._whole(self.run.blocks())
         first = next(blocks, None)
