@@ -73,7 +73,7 @@ class Playback(Closeable):
         first = min(one for one, _ in whole_range)
         last = max(two for _, two in whole_range)
         self._begin = first + round(begin * 1e9)
-        self._end = NEVER if end is None else first + round(end * 1e9)
+        self._end = NEVER if end is None else first + round(min(end, 1e9) * 1e9)
         self.duration = max(0, min(last, self._end) - self._begin) * 1e-9  #: [s] at speed 1
         if self.duration == 0 and not any(
             begin <= self._end and end >= self._begin

@@ -24,7 +24,7 @@ from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import Entries, codec_of
 from o80.recording.message_plan import Bytes, Copy, MessagePlan
 from o80.recording.message_types import row_type
-from o80.recording.scan import content_of, index_of
+from o80.recording.scan import content_of
 from o80.rows.columns import packing_at
 from o80.rows.history import History, Range, Selection
 from o80.rows.journal import EntryDecoder, JournalEntry
@@ -265,9 +265,8 @@ class RecordedEpoch(Histories):
         For recordings larger than the memory. Raises RecordingError if this part is damaged.
         """
         for part, chunk in self._having(from_time, to_time):
-            with part.reading() as file:
-                messages = messages_in(content_of(file, chunk), index_of(file, chunk, part.channel))
-                rows = self.decoded(messages)
+            with part.reading():
+                rows = self.decoded(part.messages(chunk))
             history = self._history(rows).select(from_time=from_time, to_time=to_time)
             if len(history):
                 yield history

@@ -79,7 +79,7 @@ def test_at_another_speed_rows_are_exactly_as_recorded(
 ) -> None:
     recorded = rows_of(real_time, segment)
     begin = time.monotonic()
-    with o80.play(real_time, speed=speed, hold=True) as playback:
+    with o80.play(real_time, speed=speed, end=math.inf, hold=True) as playback:
         assert playback.wait(WAIT)
         taken = time.monotonic() - begin
         with o80.Frontend(segment) as arm:
