@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import o80._core as _core
 from o80.base.errors import DriverError, InvalidArgument, RecordingError, sentence
 from o80.frontend.frontend import Frontend
 from o80.joining.difference import Difference, RobotsDifferError, first_difference, same_bytes
@@ -191,8 +190,7 @@ class RunReplay:
         return None
 
     def _motion_rules(self) -> MotionRules:
-        recorded = self.run.provenance.motion_rules
-        rules = MotionRules.of(self.run.schema, recorded, _core.MOTION_RULES)
+        rules = MotionRules(self.run.schema, self.run.provenance.motion_rules)
         if rules.differ:
             self._notes.append(
                 f"{rules}: rows are compared up to the first command that is not linear, or is of "
