@@ -107,12 +107,12 @@ class Recorder:
     @property
     def rows(self) -> int:
         """Rows recorded so far."""
-        return sum(source.rows for source in self.sources.values())
+        return sum(source.rows for source in [*self.sources.values()])  # a thread may add some
 
     @property
     def missed(self) -> int:
         """Rows that were overwritten before they were read."""
-        return sum(source.missed for source in self.sources.values())
+        return sum(source.missed for source in [*self.sources.values()])
 
     @property
     def newest(self) -> dict[str, int]:

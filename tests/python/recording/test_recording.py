@@ -81,6 +81,21 @@ def test_segments_of_a_pattern_join_when_they_appear(segment: str, tmp_path: Pat
         file["arm"]
 
 
+def test_rows_are_counted_while_a_segment_joins(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "run.mcap", ["nobody*"])
+    sources: dict[str, Any] = recorder.sources
+
+    class Joined:
+        @property
+        def rows(self) -> int:
+            sources["another"] = self  # as the thread of a recording may at any moment
+            return 1
+
+    sources["one"] = Joined()
+    assert recorder.rows == 1
+    recorder.file.close()
+
+
 class RestartsWhenAsked:
     """A frontend whose backend publishes five rows and is restarted when its life is asked for."""
 
