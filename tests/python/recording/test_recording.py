@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mcap.reader import make_reader
+from published_rows import messages_of
 
 import o80
 from o80.recording.recorded_epoch import RecordedEpoch
@@ -153,11 +153,7 @@ def test_marks_of_frontends_are_recorded_at_their_rows(arm: o80.Frontend, tmp_pa
         ("second: \u00bd l", {arm.segment: 51}),
     ]
     times = epoch.history().time
-    with path.open("rb") as content:
-        logged = [
-            message.log_time
-            for _, channel, message in make_reader(content).iter_messages(topics=["/o80/marks"])
-        ]
+    logged = [time for time, _ in messages_of(path, "/o80/marks")]
     assert logged == [int(times[row]) + epoch.wall_offset for row in (1, 31, 51)]
 
 
