@@ -63,37 +63,41 @@ USUAL = Form()
 class FileWriter:
     """Writes one file. Move-only: close it once; only `finish` completes it."""
 
-    def __init__(self, path: Path, form: Form = USUAL) -> None:
-        """Creates the file. Raises FileExistsError, or OSError without leaving a new file."""
-        self._open(path, form, os.O_CREAT | os.O_EXCL)
-        self.found = Scan()  #: of the file as written so far: all records except messages
-        try:
-            self._append(_beginning())
-        except BaseException:
-            path.unlink(missing_ok=True)
-            self._file.close()
-            raise
+    def __init__(self, path: Path, form: Form = USUAL, *, proceed: bool = False) -> None:
+        """Creates the file; with `proceed` continues it after its last whole group.
 
-    @classmethod
-    def continued(cls, path: Path, form: Form = USUAL) -> "FileWriter":
-        """Continues a file after its last whole group.
-
-        Raises RecordingError if another process writes it, NotARecordingError, OSError.
+        Raises RecordingError if another process writes it, FileExistsError, NotARecordingError, or
+        OSError without leaving a new file.
         """
-        self = cls.__new__(cls)
-        self._open(path, form, 0)
+        self.path = path
+        self.form = form
+        self.size = 0  #: [bytes]
+        self.make_room: Callable[[int], None] = lambda length: None
+        """Called before this number of bytes is written, the end of the file included."""
+        self.kept = 0  #: size of the file when it was continued [bytes]
+        self.found = Scan()  #: of the file as written so far: all records except messages
+        self._compress = _COMPRESS[form.compression]()
         try:
-            self._continue()
+            self._file = LockedFile(path, 0 if proceed else os.O_CREAT | os.O_EXCL)
+        except BlockingIOError:
+            raise RecordingError(
+                f"{path} is being written by another recorder: end it first, or choose another name"
+            ) from None
+        try:
+            if proceed:
+                self._continue()
+            else:
+                self._append(_beginning())
         except BaseException:
+            if not proceed:
+                path.unlink(missing_ok=True)
             self._file.close()
             raise
-        return self
 
     def _continue(self) -> None:
         begun = os.pread(self._file.descriptor, len(_beginning()), 0)
         if len(begun) < len(_beginning()) and _beginning().startswith(begun):
             os.ftruncate(self._file.descriptor, 0)  # not even the first group was whole
-            self.found = Scan()
             self._append(_beginning())
         self.found = found = scan(self.path)
         if found.foreign:
@@ -107,21 +111,6 @@ class FileWriter:
         if found.chunks and not (found.finished or noted):
             with contextlib.suppress(OSError):  # also on a full disk it can be finished
                 self.add_metadata(CUT, {})
-
-    def _open(self, path: Path, form: Form, flags: int) -> None:
-        self.path = path
-        self.form = form
-        self.size = 0  #: [bytes]
-        self.make_room: Callable[[int], None] = lambda length: None
-        """Called before this number of bytes is written, the end of the file included."""
-        self.kept = 0  #: size of the file when it was continued [bytes]
-        self._compress = _COMPRESS[form.compression]()
-        try:
-            self._file: LockedFile = LockedFile(path, flags)
-        except BlockingIOError:
-            raise RecordingError(
-                f"{path} is being written by another recorder: end it first, or choose another name"
-            ) from None
 
     # ------------------------------------------------------------------ groups
 

@@ -29,20 +29,16 @@ class Written:
 
 def opened(path: Path, form: Form = USUAL, *, proceed: bool) -> FileWriter:
     """Creates a file or, with `proceed`, continues it. Raises RecordingError if it cannot."""
+    if path.is_dir():
+        raise RecordingError(
+            f"{path} is a folder: give the name of a file; o80 record --continue --split continues "
+            f"in the last file of a folder"
+        )
     try:
-        if proceed and path.exists():
-            return FileWriter.continued(path, form)
-        return FileWriter(path, form)
+        return FileWriter(path, form, proceed=proceed and path.exists())
     except FileExistsError:
         raise RecordingError(
-            f"{path} is a folder: give the name of a file, or --split"
-            if path.is_dir()
-            else f"{path} exists. Choose another name, or remove it; "
-            f"o80 record --continue appends to it"
-        ) from None
-    except IsADirectoryError:
-        raise RecordingError(
-            f"{path} is a folder: give the name of a file, or --split to continue in its last file"
+            f"{path} exists. Choose another name, or remove it; o80 record --continue appends to it"
         ) from None
     except NotARecordingError as error:
         raise RecordingError(f"{error}: choose another name, or remove it") from None

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from o80.rows.columns import Column
 
-LONGEST = 2.0**62  # duration [ns], 146 years
+LONGEST = 2**62  # duration [ns], 146 years
 _HEAD = ("iteration", "time", "lateness", "overruns", "skipped", "fresh", "halted", "starvations")
 _ENDS = 5  # rows of each end of a history that a notebook shows
 _COLUMNS = 16  # most numbers of a row that a notebook shows
@@ -418,7 +418,7 @@ def _categories(pandas: Any, values: NDArray[Any], labels: dict[str, int]) -> An
 def _moment(time: int | None, name: str) -> int | None:
     """Checks a time [ns], and clamps one that no clock reaches."""
     checked = whole_or_none(time, name)
-    return None if checked is None else min(max(checked, -int(LONGEST)), int(LONGEST))
+    return None if checked is None else min(max(checked, -LONGEST), LONGEST)
 
 
 def _nanoseconds(seconds: float) -> int:
