@@ -107,34 +107,40 @@ def episodes_of(
     Raises InvalidArgument for an unknown segment or field, or wrong rewards.
     """
     robot = recording[_segment(recording, segment)]
-    step = iterations(every, "every", float(robot.schema["period"]) * 1e-9, 1)
     _sensors(robot.name, robot.schema, fields)  # refuses fields that it lacks
     usual = (begin, end) == (BEGIN, END)
     left_out = _misspelt(recording.marks, robot.name) if usual else []
     by_run = zip(map(_Run, robot.epochs), recording.marks_by_run(robot.name), strict=True)
     spans = [(run, span) for run, marks in by_run for span in _spans(marks, begin, end)]
-    found = []
+    found: list[Episode] = []
+    form: tuple[int, Mapping[str, Sequence[str]]] | None = None  # length of a step [ns], names
     for number, (run, span) in enumerate(spans):
         where = f"episode {number} (mark at row {span.marks[0].rows[robot.name]})"
         if not span.dropped:
             _refuse_wrong_rewards(span, robot.name)
+        period = run.epoch.schema["period"]
+        step = iterations(every, "every", period * 1e-9, 1)
         try:
-            found.append(_episode(span, where, run, robot.name, step, fields, left_out))
+            episode = _episode(span, where, run, robot.name, step, fields, left_out)
+            own = period * step, _names(run.epoch.schema, episode.sensors)
+            form = form or own
+            if own != form:
+                raise InvalidArgument("it has another frequency or other numbers than the first")
+            found.append(episode)
         except InvalidArgument as error:
             left_out.append(f"{where}: {error}")
-    if not found:
+    if form is None:
         why = f": {left_out[0]}" if left_out else f": it has no mark '{begin}'"
         raise InvalidArgument(
             f"{recording.path} holds no episode of '{robot.name}'{why}. While it is recorded, "
             f"mark the beginning of each: `o80 mark {robot.name} {begin}` in a terminal, a key of "
             f'`o80 teleop`, or recording.mark("{begin}") in a program'
         )
-    schema = found[0].rows.schema
     return Episodes(
         segment=robot.name,
-        robot=schema["robot"],
-        frequency=1e9 / (schema["period"] * step),
-        names=_names(schema, found[0].sensors),
+        robot=found[0].rows.schema["robot"],
+        frequency=1e9 / form[0],
+        names=form[1],
         all=found,
         left_out=left_out,
     )

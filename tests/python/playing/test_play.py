@@ -176,7 +176,6 @@ def test_a_living_robot_keeps_its_name(recorded: Path, segment: str) -> None:
         ({"begin": -1.0}, "begin must be a number of seconds from 0"),
         ({"begin": 2.0, "end": 1.0}, "end must be later than begin"),
         ({"history": 0}, "history"),
-        ({"segments": "aram"}, "no segment 'aram'"),
     ],
 )
 def test_mistakes_are_named(recorded: Path, arguments: dict[str, Any], message: str) -> None:
