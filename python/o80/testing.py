@@ -108,10 +108,11 @@ class _Suite:
             for number in actuator.numbers:
                 dot = f".{number.name}" if number.name else ""
                 value = float(values[f"observed.{actuator.name}{dot}"])
-                bounded += math.isfinite(number.minimum) and math.isfinite(number.maximum)
-                assert number.minimum <= value <= number.maximum, (
+                low, high = number.limits.minimum, number.limits.maximum
+                bounded += math.isfinite(low) and math.isfinite(high)
+                assert low <= value <= high, (
                     f"observed.{actuator.name}{dot} is {value:g} in row 0, outside its limits from "
-                    f"{number.minimum:g} to {number.maximum:g}"
+                    f"{low:g} to {high:g}"
                 )
         if arm.actuators and not bounded:
             self._left.append("motion: no number has a minimum and a maximum")
@@ -234,10 +235,10 @@ def _bounded(arm: "Frontend") -> Iterator[tuple[int, dict[str, tuple[float, floa
     """Index of each actuator, and the ranges of its numbers with a minimum and a maximum."""
     for actuator in arm.actuators:
         ranges = {
-            number.name: (number.minimum, number.maximum)
+            number.name: (number.limits.minimum, number.limits.maximum)
             for number in actuator.numbers
-            if math.isfinite(number.minimum)
-            and math.isfinite(number.maximum)
+            if math.isfinite(number.limits.minimum)
+            and math.isfinite(number.limits.maximum)
             and number.name.isidentifier() | (number.name == "")
         }
         if ranges:

@@ -18,11 +18,11 @@ def reason(path: Path, error: OSError) -> str:
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Turns an OSError of its block into an Error that names the file."""
+def writing(path: Path, kind: type[Error] = Error) -> Iterator[None]:
+    """Turns an OSError of its block into an Error of this kind that names the file."""
     try:
         yield
     except Error:
         raise
     except OSError as error:
-        raise Error(f"{path} cannot be written: {reason(path, error)}") from error
+        raise kind(f"{path} cannot be written: {reason(path, error)}") from error

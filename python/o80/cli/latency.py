@@ -5,6 +5,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
 from o80.base.errors import InvalidArgument
@@ -56,6 +57,5 @@ def _signal(text: str) -> "str | Callable[[History], Any]":
     match = re.fullmatch(r"norm\((.+)\)", text)
     if match is None:
         return text
-    from o80.joining.latency import norm_of
-
-    return norm_of(match[1])
+    path = match[1]
+    return lambda rows: np.linalg.norm(rows[path].reshape(len(rows), -1), axis=1)

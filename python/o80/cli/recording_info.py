@@ -44,11 +44,7 @@ def recording_info(path: Path, *, as_json: bool = False) -> None:
     from o80.recording.reader import open as open_recording
 
     recording = open_recording(path)
-    runs = [
-        (name, number, epoch)
-        for name in recording
-        for number, epoch in enumerate(recording[name].epochs)
-    ]
+    runs = [*recording.runs()]
     if as_json:
         print_json([_fields(name, number, epoch) for name, number, epoch in runs])
         return
@@ -154,8 +150,6 @@ def latency_of(epoch: "RecordedEpoch") -> dict[str, int]:
 
 def _last_entries(epoch: "RecordedEpoch") -> "list[_core.JournalEntry]":
     """Reads the last journal entries of recorded rows; none if a newer o80 wrote the journal."""
-    if epoch.journal_codec is None or epoch.journal_codec > _core.JOURNAL_CODEC:
-        return []
     rows = range(epoch.first_row, epoch.next_row)
     return [each for each in epoch.last_entries(MAX_ENTRIES) if each.iteration in rows]
 

@@ -3,9 +3,8 @@
 The rules are in docs/recording/exporting.md#export-for-learning.
 """
 
-import functools
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +44,7 @@ class Episode:
     task: str
     values: Mapping[str, Any]  #: values of the mark at its begin
     sensors: Sequence[Column]  #: the columns of `extended`
-    _commands: Callable[[], Asked] = field(repr=False)
+    _run: "_Run" = field(repr=False)
 
     def __len__(self) -> int:
         return len(self.rewards)
@@ -74,7 +73,7 @@ class Episode:
         """Returns the commands' targets (T, columns) at the ends of the steps, for columns of
         desired numbers; NaN where there was no target.
         """
-        return self._commands().at(self.rows.iteration[1:], columns)
+        return self._run.asked.at(self.rows.iteration[1:], columns)
 
 
 @dataclass(frozen=True)
@@ -108,35 +107,40 @@ def episodes_of(
     Raises InvalidArgument for an unknown segment or field, or wrong rewards.
     """
     robot = recording[_segment(recording, segment)]
-    epochs = [epoch for epoch in robot.epochs if epoch.rows]
-    step = iterations(every, "every", float(robot.schema["period"]) * 1e-9, 1)
-    taken = {epoch: _Orders.of(epoch.native_journal()) for epoch in epochs}
-    commands = {epoch: functools.cache(functools.partial(_asked, epoch)) for epoch in epochs}
-    rows = {epoch: functools.cache(epoch.history) for epoch in epochs}  # decoded once
     _sensors(robot.name, robot.schema, fields)  # refuses fields that it lacks
     usual = (begin, end) == (BEGIN, END)
     left_out = _misspelt(recording.marks, robot.name) if usual else []
-    found = []
-    for span in _spans(recording.marks, robot.name, begin, end):
+    by_run = zip(map(_Run, robot.epochs), recording.marks_by_run(robot.name), strict=True)
+    spans = [(run, span) for run, marks in by_run for span in _spans(marks, begin, end)]
+    found: list[Episode] = []
+    form: tuple[int, Mapping[str, Sequence[str]]] | None = None  # length of a step [ns], names
+    for number, (run, span) in enumerate(spans):
+        where = f"episode {number} (mark at row {span.marks[0].rows[robot.name]})"
         if not span.dropped:
             _refuse_wrong_rewards(span, robot.name)
+        period = run.epoch.schema["period"]
+        step = iterations(every, "every", period * 1e-9, 1)
         try:
-            found.append(_episode(span, rows, robot.name, step, taken, commands, fields, left_out))
+            episode = _episode(span, where, run, robot.name, step, fields, left_out)
+            own = period * step, _names(run.epoch.schema, episode.sensors)
+            form = form or own
+            if own != form:
+                raise InvalidArgument("it has another frequency or other numbers than the first")
+            found.append(episode)
         except InvalidArgument as error:
-            left_out.append(str(error))
-    if not found:
+            left_out.append(f"{where}: {error}")
+    if form is None:
         why = f": {left_out[0]}" if left_out else f": it has no mark '{begin}'"
         raise InvalidArgument(
             f"{recording.path} holds no episode of '{robot.name}'{why}. While it is recorded, "
             f"mark the beginning of each: `o80 mark {robot.name} {begin}` in a terminal, a key of "
             f'`o80 teleop`, or recording.mark("{begin}") in a program'
         )
-    schema = found[0].rows.schema
     return Episodes(
         segment=robot.name,
-        robot=schema["robot"],
-        frequency=1e9 / (schema["period"] * step),
-        names=_names(schema, found[0].sensors),
+        robot=found[0].rows.schema["robot"],
+        frequency=1e9 / form[0],
+        names=form[1],
         all=found,
         left_out=left_out,
     )
@@ -147,32 +151,27 @@ def episodes_of(
 
 @dataclass(frozen=True)
 class _Span:
-    number: int
     marks: Sequence["Mark"]  #: the mark at its begin, and marks in it
     until: "Mark | None"  #: the mark at which it ends
     ending: "Mark | None"  #: `until`, if it is an end mark
     dropped: bool  #: whether the program dropped it
 
 
-def _spans(marks: Sequence["Mark"], segment: str, begin: str, end: str) -> Iterator[_Span]:
-    """Yields the spans between marks that begin and end episodes."""
+def _spans(marks: Sequence["Mark"], begin: str, end: str) -> Iterator[_Span]:
+    """Yields the spans between the marks of a run that begin and end episodes."""
     open_at: list[Mark] = []
-    number = 0
     for mark in marks:
-        if segment not in mark.rows:
-            continue
         begins = mark.name == begin or mark.name.startswith(f"{begin}: ")
         if open_at and (begins or mark.name in (end, begin + DROPPED)):
             dropped = mark.name == begin + DROPPED
-            yield _Span(number, open_at, mark, None if begins else mark, dropped)
-            number += 1
+            yield _Span(open_at, mark, None if begins else mark, dropped)
             open_at = []
         if begins:
             open_at = [mark]
         elif open_at:
             open_at.append(mark)
     if open_at:
-        yield _Span(number, open_at, None, None, False)
+        yield _Span(open_at, None, None, False)
 
 
 def _misspelt(marks: Sequence["Mark"], segment: str) -> list[str]:
@@ -188,67 +187,73 @@ def _misspelt(marks: Sequence["Mark"], segment: str) -> list[str]:
     ]
 
 
+class _Run:
+    """A run of the robot; its rows and its journal are read once."""
+
+    def __init__(self, epoch: "RecordedEpoch") -> None:
+        self.epoch = epoch
+
+    @cached
+    def rows(self) -> History:
+        return self.epoch.history()
+
+    @cached
+    def orders(self) -> "_Orders":
+        return _Orders.of(self.epoch.native_journal())
+
+    @cached
+    def asked(self) -> Asked:
+        return Asked(self.epoch.native_journal(), self.epoch.schema)
+
+
 def _episode(
     span: _Span,
-    rows_of: Mapping["RecordedEpoch", Callable[[], History]],
+    where: str,
+    run: _Run,
     segment: str,
     every: int,
-    taken: Mapping["RecordedEpoch", "_Orders"],
-    commands: Mapping["RecordedEpoch", Callable[[], Asked]],
     fields: Sequence[str],
     left_out: list[str],
 ) -> Episode:
     """Makes an episode. Raises InvalidArgument if it was dropped, lacks rows or has no step."""
-    mark = span.marks[0]
-    where = f"episode {span.number} (mark at row {mark.rows[segment]})"
     if span.dropped:
-        raise InvalidArgument(f"{where}: it was discarded")
-    epochs = [*rows_of]
-    epoch = _epoch_at(mark, epochs)
-    run = rows_of[epoch]()
-    first = mark.rows[segment]
-    last = None
-    if span.until is not None and _epoch_at(span.until, epochs) is epoch:
-        last = span.until.rows[segment]
-    rows = run.select(since=first, until=last)
+        raise InvalidArgument("it was discarded")
+    mark, ending = span.marks[0], span.ending
+    first, last = mark.rows[segment], None if span.until is None else span.until.rows[segment]
+    rows = run.rows.select(since=first, until=last)
     if not len(rows) or rows.iteration[0] != first:
-        raise InvalidArgument(f"{where}: its first row is not in the recording")
+        raise InvalidArgument("its first row is not in the recording")
     fresh = np.flatnonzero(rows.fresh[1:])
     is_cut = False
     if len(fresh):
         rows = rows[: 1 + int(fresh[0])]
         began = int(rows.iteration[-1]) + 1
-        if span.ending is not None and last is not None and last > began:
+        if ending is not None and last is not None and last > began:
             is_cut = True
             left_out.append(
                 f"{where}: it ends at row {began}, where the robot made a fresh start (a resume, "
-                f"a reset, a request); the rows up to its mark '{span.ending.name}' at row {last} "
+                f"a reset, a request); the rows up to its mark '{ending.name}' at row {last} "
                 f"are left out"
             )
     if len(rows) != rows.iteration[-1] - first + 1:
-        raise InvalidArgument(f"{where}: it has a gap")
+        raise InvalidArgument("it has a gap")
     steps = (len(rows) - 1) // every
     if steps < 1:
-        raise InvalidArgument(f"{where}: it has no step")
+        raise InvalidArgument("it has no step")
     rows = rows[: steps * every + 1 : every]
-    seen, delays = taken[epoch].decided(rows.iteration[1:], run)
-    ending = span.ending
+    seen, delays = run.orders.decided(rows.iteration[1:], run.rows)
     task = str(mark.values.get("task", "")) or mark.name.partition(": ")[2]
     return Episode(
         rows=rows,
-        rewards=_rewards(span, ending, segment, every, steps),
+        rewards=_rewards(span, segment, every, steps),
         seen=seen,
         delays=delays,
         terminated=ending is not None and not is_cut and not ending.values.get("truncated", False),
-        task=task or epoch.schema["robot"],
+        task=task or run.epoch.schema["robot"],
         values=mark.values,
-        sensors=_sensors(segment, epoch.schema, fields),
-        _commands=commands[epoch],
+        sensors=_sensors(segment, run.epoch.schema, fields),
+        _run=run,
     )
-
-
-def _asked(epoch: "RecordedEpoch") -> Asked:
-    return Asked(epoch.native_journal(), epoch.schema)
 
 
 @dataclass(frozen=True)
@@ -294,12 +299,6 @@ def _times(rows: History, iterations: NDArray[np.int64]) -> NDArray[np.float64]:
     return np.where(rows.iteration[at] == iterations, times, np.nan)
 
 
-def _epoch_at(mark: "Mark", epochs: Sequence["RecordedEpoch"]) -> "RecordedEpoch":
-    """Returns the run that was being recorded at the time of a mark."""
-    begun = [epoch for epoch in epochs if epoch.recorded_at <= mark.time]
-    return begun[-1] if begun else epochs[0]
-
-
 def _refuse_wrong_rewards(span: _Span, segment: str) -> None:
     """Raises InvalidArgument for values `reward` and `rewards` that are no finite numbers."""
     ending = span.ending
@@ -321,11 +320,9 @@ def _is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and abs(value) <= sys.float_info.max
 
 
-def _rewards(
-    span: _Span, ending: "Mark | None", segment: str, every: int, steps: int
-) -> NDArray[np.float64]:
+def _rewards(span: _Span, segment: str, every: int, steps: int) -> NDArray[np.float64]:
     """Returns each step's reward: `rewards` of the last mark, or sums of `reward` of marks."""
-    rewards = np.zeros(steps)
+    rewards, ending = np.zeros(steps), span.ending
     given = ending.values.get("rewards") if ending is not None else None
     if given:
         places = np.arange(len(given)) * steps // len(given)
@@ -344,9 +341,7 @@ def _rewards(
 
 def _segment(recording: "RecordingFile", segment: str | None) -> str:
     if segment is not None:
-        if segment not in recording.segments:
-            raise InvalidArgument(f"no segment '{segment}' in {recording.path}")
-        return segment
+        return recording.chosen([segment])[0]
     moving = [name for name in recording if recording[name].schema["actuators"]]
     if len(moving) != 1:
         raise InvalidArgument(

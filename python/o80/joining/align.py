@@ -130,7 +130,7 @@ def align(
 def _by_seen(sources: "Mapping[str, Source]", seconds: float | None) -> Aligned:
     """Joins the rows of the first source with the rows on which its commands were based."""
     name, *others = sources
-    run = run_of(name, sources[name])
+    run = run_of(sources[name])
     if not hasattr(run, "journal") or not others:
         raise InvalidArgument(
             f"by='seen' needs at least two sources. The first one must have a journal with the "

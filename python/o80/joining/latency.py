@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-import o80._core as _core
 from o80.base.arrays import FloatArray
 from o80.base.errors import Error, InvalidArgument
 from o80.joining.row_selection import NANOSECOND
 from o80.joining.sources import CAPTURE_ERROR, Timed, timed
-from o80.rows.columns import Column, columns_of, is_within
-from o80.rows.history import History, numbers_of, values_of
+from o80.rows.history import History
 
 if TYPE_CHECKING:
     from o80.joining.sources import Source
@@ -138,15 +136,14 @@ def _smooth(source: Timed, signal: "Signal", begin: int, end: int, width: float)
 def _numbers(source: Timed, signal: "Signal") -> tuple[FloatArray, NDArray[np.int64]]:
     """Returns the finite numbers of a signal, and their times [ns]."""
     history = source.history
-    if callable(signal):
-        values = np.asarray(signal(history), np.float64)
-        if values.shape != (len(history),):
-            raise InvalidArgument(
-                f"the function of a signal must return numbers ({len(history)},), one for each "
-                f"row, got {values.shape}"
-            )
-    else:
-        values = values_of(history, _column(history, signal)).astype(np.float64)
+    given = signal(history) if callable(signal) else history[signal]
+    values = np.asarray(given, np.float64)
+    if values.shape != (len(history),):
+        named = "the function of a signal" if callable(signal) else f"'{signal}'"
+        raise InvalidArgument(
+            f"{named} must give ({len(history)},), a number for each row, got {values.shape}: "
+            f"choose one of several numbers, or give a function that makes one of them"
+        )
     values = values[source.rows]
     whole = np.isfinite(values)
     if whole.sum() < MIN_ROWS:
@@ -160,16 +157,6 @@ def _capture_error(source: Timed) -> float:
         return 0.0
     errors = np.asarray(getattr(source.history.extended, CAPTURE_ERROR))[source.rows]
     return float(np.median(errors)) * NANOSECOND
-
-
-def _column(history: History, path: str) -> Column:
-    found = columns_below(history, path)
-    if len(found) == 1:
-        return found[0]
-    raise InvalidArgument(
-        f"'{path}' names {len(found)} numbers ({found[0].name}, ...): choose one, or give a "
-        "function that makes one of them"
-    )
 
 
 def _estimate(x: FloatArray, y: FloatArray, lags: int, period: float) -> Latency:
@@ -231,24 +218,3 @@ def _peak(moments: FloatArray) -> tuple[float, float]:
     left, top, right = share[best - 1 : best + 2]
     bend = left - 2 * top + right
     return float(top), best + (0.5 * float((left - right) / bend) if bend < 0 else 0.0)
-
-
-def columns_below(history: History, path: str) -> list[Column]:
-    """Returns the columns at or below a path. Raises InvalidArgument if there are none."""
-    columns = [*columns_of(history.schema)]
-    chosen = [column for column in columns if is_within(column.name, path)]
-    if not chosen:
-        instead = _core.names_instead(path, [column.name for column in columns])
-        raise InvalidArgument(f"there is no field '{path}'{instead}")
-    return chosen
-
-
-def norm_of(path: str) -> Callable[[History], NDArray[np.float64]]:
-    """Returns a function for the norm (T,) of all numbers below a path ("extended.velocity")."""
-
-    def norm(history: History) -> NDArray[np.float64]:
-        numbers = numbers_of(history, columns_below(history, path))
-        length: NDArray[np.float64] = np.linalg.norm(numbers, axis=1)
-        return length
-
-    return norm

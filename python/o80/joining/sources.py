@@ -54,7 +54,7 @@ def timed(
         raise InvalidArgument(f"offsets: there is no {unknown[0]!r}; there are: {', '.join(found)}")
     offset_of: dict[str, int] = {}  # one for each boot: the wall clock may have been set in between
     for name, (history, offset) in found.items():
-        boot = _boot_of(run_of(name, given[name]))
+        boot = _boot_of(run_of(given[name]))
         if boot and offset is not None and history.schema["clock"] == "monotonic":
             found[name] = history, offset_of.setdefault(boot, offset)
     shifts = shifts_of(found)
@@ -90,20 +90,12 @@ def named(sources: "Sources") -> "Mapping[str, Source]":
     return found
 
 
-def run_of(name: str, source: Any) -> Any:
-    """Returns a frontend, history or recorded run as it is; for a recorded segment its only run.
+def run_of(source: Any) -> Any:
+    """Returns a source as it is; for a recorded segment its only run.
 
     Raises InvalidArgument if a segment has several runs.
     """
-    epochs = getattr(source, "epochs", None)
-    if epochs is not None:
-        if len(epochs) != 1:
-            raise InvalidArgument(
-                f"'{name}' was recorded in {len(epochs)} runs: choose one, as "
-                f"{{'{name}': recording['{name}'].epochs[0]}}"
-            )
-        (source,) = epochs
-    return source
+    return getattr(source, "_run", source)
 
 
 def _boot_of(run: Any) -> str:
@@ -116,7 +108,7 @@ def _boot_of(run: Any) -> str:
 
 def opened(name: str, source: Any, seconds: float | None) -> tuple[History, int | None]:
     """Reads the history of a source, and wall-clock minus row time [ns]; None: not known."""
-    source = run_of(name, source)
+    source = run_of(source)
     if isinstance(source, History):
         return source.select(seconds=seconds) if seconds is not None else source, None
     if not hasattr(source, "history"):

@@ -109,8 +109,8 @@ class Teleoperation:
         self._fields = [taken[name].numbers[0].name for name in names]
         self._scale = np.array([joint.scale for joint in self.joints])
         self._offset = np.array([joint.offset for joint in self.joints])
-        self._low = np.array([taken[name].minimum for name in names])
-        self._high = np.array([taken[name].maximum for name in names])
+        self._low = np.array([taken[name].limits.minimum for name in names])
+        self._high = np.array([taken[name].limits.maximum for name in names])
         self._stride = max(1, round(1 / (FASTEST * leader.period)))  # leader's rows per step
         self._every = max(self._stride * leader.period, follower.period)
         self._last = leader.published  # iteration of the last row read

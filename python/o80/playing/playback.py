@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-import o80._core as _core
 from o80.base import lifecycle
 from o80.base.argument_checks import whole
 from o80.base.errors import InvalidArgument
@@ -74,7 +73,7 @@ class Playback(Closeable):
         first = min(one for one, _ in whole_range)
         last = max(two for _, two in whole_range)
         self._begin = first + round(begin * 1e9)
-        self._end = NEVER if end is None else first + round(end * 1e9)
+        self._end = NEVER if end is None else first + round(min(end, 1e9) * 1e9)
         self.duration = max(0, min(last, self._end) - self._begin) * 1e-9  #: [s] at speed 1
         if self.duration == 0 and not any(
             begin <= self._end and end >= self._begin
@@ -251,15 +250,7 @@ def _tracks(path: str | os.PathLike[str], segments: str | Sequence[str] | None) 
 
     file = RecordingFile(path)
     wanted = [segments] if isinstance(segments, str) else segments
-    for name in wanted or ():
-        if name not in file.segments:
-            raise InvalidArgument(
-                f"no segment '{name}' in {path}{_core.names_instead(name, list(file))}"
-            )
-    offsets: list[int] = []
-    tracks = [
-        Track(name, file[name].epochs, offsets) for name in (wanted if wanted else list(file))
-    ]
+    tracks = [Track(name, file[name].epochs) for name in file.chosen(wanted)]
     tracks = [track for track in tracks if track.epochs]
     if not tracks:
         raise InvalidArgument(f"{path} has no row to play: no robot ran meanwhile")

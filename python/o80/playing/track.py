@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from o80.recording.recorded_epoch import RecordedEpoch
 
 MAX_ROWS = 256  # most rows of a part, which one call publishes
-SAME_CLOCK = 500_000_000  # clocks whose offsets differ by less are one clock [ns]
 
 
 @dataclass(frozen=True)
@@ -32,39 +31,22 @@ class Part:
 class Track:
     """The runs of one segment."""
 
-    def __init__(self, name: str, epochs: Sequence["RecordedEpoch"], offsets: list[int]) -> None:
-        """offsets: monotonic to wall-clock time [ns] of the clocks seen so far; may be extended.
-
-        Robots on one monotonic clock keep the exact differences of their times, although each
-        offset was measured at another moment.
-        """
+    def __init__(self, name: str, epochs: Sequence["RecordedEpoch"]) -> None:
         self.name = name
         self.epochs = [epoch for epoch in epochs if epoch.rows]
-        self.offsets = [_offset(epoch, offsets) for epoch in self.epochs]
 
     @property
     def time_range(self) -> tuple[int, int]:
         """Returns the wall-clock times of the first and the last row [ns]."""
-        ranges = [epoch.time_range for epoch in self.epochs]
-        begins = [first + offset for (first, _), offset in zip(ranges, self.offsets, strict=True)]
-        ends = [last + offset for (_, last), offset in zip(ranges, self.offsets, strict=True)]
+        ranges = [(*epoch.time_range, epoch.wall_offset) for epoch in self.epochs]
+        begins, ends = zip(*((a + offset, b + offset) for a, b, offset in ranges), strict=True)
         return min(begins), max(ends)
 
     def parts(self, begin: int, end: int) -> Iterator[Part]:
         """Yields the rows from `begin` to `end` [ns on the wall clock] in small parts."""
-        for run, (epoch, offset) in enumerate(zip(self.epochs, self.offsets, strict=True)):
+        for run, epoch in enumerate(self.epochs):
+            offset = epoch.wall_offset
             for history in epoch.blocks(from_time=begin - offset, to_time=end - offset):
                 for first in range(0, len(history), MAX_ROWS):
                     rows = history.rows[first : first + MAX_ROWS]
                     yield Part(run, rows, rows["time"] + offset)
-
-
-def _offset(epoch: "RecordedEpoch", offsets: list[int]) -> int:
-    """Returns wall-clock time minus row time of an epoch [ns]; equal for epochs of one clock."""
-    if epoch.schema["clock"] != "monotonic":
-        return epoch.wall_offset
-    for known in offsets:
-        if abs(known - epoch.wall_offset) < SAME_CLOCK:
-            return known
-    offsets.append(epoch.wall_offset)
-    return epoch.wall_offset

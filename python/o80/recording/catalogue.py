@@ -128,11 +128,7 @@ def _warn(error: OSError) -> None:
 def _found(path: Path, size: int) -> FoundRecording:
     try:
         recording = RecordingFile(path)
-        runs = tuple(
-            run_found(name, number, epoch)
-            for name in recording
-            for number, epoch in enumerate(recording[name].epochs)
-        )
+        runs = tuple(run_found(*run) for run in recording.runs())
         every = recording.marks
         marks = tuple(
             (mark.name, mark.row_time, json_text(mark.values)[:1000])

@@ -2,9 +2,9 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from datetime import datetime
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from o80.base.errors import RecordingError
 from o80.frontend.reader import Reader
@@ -81,19 +81,10 @@ class EpochNote:
             raise RecordingError(
                 f"the recording is damaged: {name[:80]!r} cannot be the name of a segment"
             )
+        kinds: dict[str, Any] = {each.name: each.type for each in fields(cls) if each.name in texts}
         try:
-            return cls(
-                segment=texts["segment"],
-                robot=texts["robot"],
-                epoch=int(texts["epoch"]),
-                number=int(texts["number"]),
-                begin=int(texts["begin"]),
-                wall_offset=int(texts["wall_offset"]),
-                clock=texts["clock"],
-                before=texts.get("before", LATE),
-                boot=texts.get("boot", ""),
-            )
-        except (KeyError, ValueError):
+            return cls(**{name: kind(texts[name]) for name, kind in kinds.items()})
+        except (TypeError, ValueError):
             return None
 
     def run_texts(self) -> dict[str, str]:

@@ -106,12 +106,11 @@ class EpochPart:
         place = self._description
         return 0 if place is None else place.create_time
 
-    def last_entries(self) -> Entries | None:
-        """Reads the newest journal entries, if any. Raises RecordingError for a damaged file."""
-        if self.journal is None:
-            return None
-        with self.reading() as file:
-            return next(entries_in(file, self.found, self.journal, newest_first=True), None)
+    def entries(self, *, newest_first: bool = False) -> Iterator[Entries]:
+        """Yields the entries of the journal as stored. Raises RecordingError if it is damaged."""
+        if self.journal is not None:
+            with self.reading() as file:
+                yield from entries_in(file, self.found, self.journal, newest_first=newest_first)
 
     def table(self) -> bytes:
         """Reads the description of the robot. Raises RecordingError if it is missing or damaged."""

@@ -7,7 +7,6 @@ behind that group.
 import contextlib
 import os
 import shutil
-import struct
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,10 +14,10 @@ from pathlib import Path
 
 import lz4.frame
 import zstandard
-from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
     Channel,
+    Chunk,
     ChunkIndex,
     Header,
     Metadata,
@@ -29,7 +28,7 @@ from mcap.records import (
 import o80._core as _core
 from o80.base.errors import InvalidArgument, RecordingError
 from o80.recording.blocks import Block
-from o80.recording.chunks import HEAD, bytes_of
+from o80.recording.chunks import bytes_of
 from o80.recording.locked_file import LockedFile, reserve
 from o80.recording.scan import CUT, MAGIC, Scan, place_of, scan
 from o80.recording.summary import end_of_file, room_for_end
@@ -42,7 +41,6 @@ _COMPRESS: dict[str, Callable[[], Callable[[bytes], bytes]]] = {
     "lz4": lambda: lz4.frame.compress,
     "none": lambda: bytes,
 }
-CHUNK_HEAD = struct.Struct("<BQQQQI")
 
 
 @dataclass(frozen=True)
@@ -65,37 +63,41 @@ USUAL = Form()
 class FileWriter:
     """Writes one file. Move-only: close it once; only `finish` completes it."""
 
-    def __init__(self, path: Path, form: Form = USUAL) -> None:
-        """Creates the file. Raises FileExistsError, or OSError without leaving a new file."""
-        self._open(path, form, os.O_CREAT | os.O_EXCL)
-        self.found = Scan()  #: of the file as written so far: all records except messages
-        try:
-            self._append(_beginning())
-        except BaseException:
-            path.unlink(missing_ok=True)
-            self._file.close()
-            raise
+    def __init__(self, path: Path, form: Form = USUAL, *, proceed: bool = False) -> None:
+        """Creates the file; with `proceed` continues it after its last whole group.
 
-    @classmethod
-    def continued(cls, path: Path, form: Form = USUAL) -> "FileWriter":
-        """Continues a file after its last whole group.
-
-        Raises RecordingError if another process writes it, NotARecordingError, OSError.
+        Raises RecordingError if another process writes it, FileExistsError, NotARecordingError, or
+        OSError without leaving a new file.
         """
-        self = cls.__new__(cls)
-        self._open(path, form, 0)
+        self.path = path
+        self.form = form
+        self.size = 0  #: [bytes]
+        self.make_room: Callable[[int], None] = lambda length: None
+        """Called before this number of bytes is written, the end of the file included."""
+        self.kept = 0  #: size of the file when it was continued [bytes]
+        self.found = Scan()  #: of the file as written so far: all records except messages
+        self._compress = _COMPRESS[form.compression]()
         try:
-            self._continue()
+            self._file = LockedFile(path, 0 if proceed else os.O_CREAT | os.O_EXCL)
+        except BlockingIOError:
+            raise RecordingError(
+                f"{path} is being written by another recorder: end it first, or choose another name"
+            ) from None
+        try:
+            if proceed:
+                self._continue()
+            else:
+                self._append(_beginning())
         except BaseException:
+            if not proceed:
+                path.unlink(missing_ok=True)
             self._file.close()
             raise
-        return self
 
     def _continue(self) -> None:
         begun = os.pread(self._file.descriptor, len(_beginning()), 0)
         if len(begun) < len(_beginning()) and _beginning().startswith(begun):
             os.ftruncate(self._file.descriptor, 0)  # not even the first group was whole
-            self.found = Scan()
             self._append(_beginning())
         self.found = found = scan(self.path)
         if found.foreign:
@@ -109,21 +111,6 @@ class FileWriter:
         if found.chunks and not (found.finished or noted):
             with contextlib.suppress(OSError):  # also on a full disk it can be finished
                 self.add_metadata(CUT, {})
-
-    def _open(self, path: Path, form: Form, flags: int) -> None:
-        self.path = path
-        self.form = form
-        self.size = 0  #: [bytes]
-        self.make_room: Callable[[int], None] = lambda length: None
-        """Called before this number of bytes is written, the end of the file included."""
-        self.kept = 0  #: size of the file when it was continued [bytes]
-        self._compress = _COMPRESS[form.compression]()
-        try:
-            self._file: LockedFile = LockedFile(path, flags)
-        except BlockingIOError:
-            raise RecordingError(
-                f"{path} is being written by another recorder: end it first, or choose another name"
-            ) from None
 
     # ------------------------------------------------------------------ groups
 
@@ -206,17 +193,9 @@ class FileWriter:
         compression = "" if self.form.compression == "none" else self.form.compression
         start = min(int(block.log_times.min()) for block in blocks)
         end = max(int(block.log_times.max()) for block in blocks)
-        named = compression.encode()
-        head = CHUNK_HEAD.pack(
-            Opcode.CHUNK,
-            CHUNK_HEAD.size - HEAD.size + 4 + len(named) + 8 + len(compressed),
-            start,
-            end,
-            len(content),
-            zlib.crc32(content),
+        chunk = bytes_of(
+            Chunk(compression, compressed, end, start, zlib.crc32(content), len(content))
         )
-        chunk = head + struct.pack("<I", len(named)) + named
-        chunk += struct.pack("<Q", len(compressed)) + compressed
         indexes, offsets, at = b"", {}, 0
         for block in blocks:
             offsets[block.channel] = self.size + len(chunk) + len(indexes)

@@ -68,7 +68,6 @@ class JournalRecorder:
         self._core = _core.RawJournal(frontend, first)
         self.exists = self._core.exists  #: the backend was started with a journal
         self._next = first if first > 0 else None  # None: begins with the oldest entry
-        self.missed = 0  #: entries that were overwritten before they were read
 
     @property
     def unread(self) -> float:
@@ -95,7 +94,6 @@ class JournalRecorder:
             self.begin = first
         if self._next is not None and first > self._next:
             gap = self._next, first - 1
-            self.missed += first - self._next
         self._next = end
         return Entries(first, end, content), gap
 

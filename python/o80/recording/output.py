@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from o80.base.errors import RecordingError
-from o80.base.unwritable import reason
+from o80.base.unwritable import reason, writing
 from o80.recording.epoch import EpochNote, WallClock, channels_of
 from o80.recording.epoch_part import parts_of
 from o80.recording.file_writer import JOINT_STATES, USUAL, FileWriter, Form
@@ -29,20 +29,16 @@ class Written:
 
 def opened(path: Path, form: Form = USUAL, *, proceed: bool) -> FileWriter:
     """Creates a file or, with `proceed`, continues it. Raises RecordingError if it cannot."""
+    if path.is_dir():
+        raise RecordingError(
+            f"{path} is a folder: give the name of a file; o80 record --continue --split continues "
+            f"in the last file of a folder"
+        )
     try:
-        if proceed and path.exists():
-            return FileWriter.continued(path, form)
-        return FileWriter(path, form)
+        return FileWriter(path, form, proceed=proceed and path.exists())
     except FileExistsError:
         raise RecordingError(
-            f"{path} is a folder: give the name of a file, or --split"
-            if path.is_dir()
-            else f"{path} exists. Choose another name, or remove it; "
-            f"o80 record --continue appends to it"
-        ) from None
-    except IsADirectoryError:
-        raise RecordingError(
-            f"{path} is a folder: give the name of a file, or --split to continue in its last file"
+            f"{path} exists. Choose another name, or remove it; o80 record --continue appends to it"
         ) from None
     except NotARecordingError as error:
         raise RecordingError(f"{error}: choose another name, or remove it") from None
@@ -62,10 +58,8 @@ def opened_in(folder: Path, form: Form = USUAL, *, proceed: bool) -> FileWriter:
             f"{folder} exists. Choose another name, or remove it; "
             f"o80 record --continue --split appends to it"
         )
-    try:
+    with writing(folder, RecordingError):
         folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise RecordingError(f"{folder} cannot be written: {reason(folder, error)}") from error
     files = in_order(folder) or [folder / "0000.mcap"]
     last = opened(files[-1], form, proceed=True)  # locks the folder
     for file in files:
@@ -143,6 +137,6 @@ class Predecessor:
             known = replace(known, has_journal=known.has_journal or journal is not None)
             if known.last < 0 and part.last_chunk is not None:
                 known = replace(known, last=part.last_row, last_log_time=part.log_times[1])
-            if known.journal_next == 0 and (last := part.last_entries()) is not None:
+            if known.journal_next == 0 and (last := next(part.entries(newest_first=True), None)):
                 known = replace(known, journal_next=last.next)
             epochs[note.epoch] = known

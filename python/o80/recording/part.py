@@ -4,7 +4,7 @@ import math
 import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import IO
 
@@ -12,7 +12,7 @@ import numpy as np
 from mcap.records import Channel, ChunkIndex
 
 from o80.base.errors import RecordingError
-from o80.base.unwritable import reason
+from o80.base.unwritable import writing
 from o80.recording.blocks import Block
 from o80.recording.epoch import GAP, OVERWRITTEN, EpochNote, channels_of, iteration_in
 from o80.recording.file_writer import JOINT_STATES, FileWriter
@@ -65,36 +65,28 @@ def write_part(
             found.chunks.start + _largest(_shifts(found, offsets)) for _, found in files
         ),
     )
+    runs = [run for recording in read for run in recording.runs()]
     file = opened(output, proceed=False)
     try:
-        writer = _PartWriter(file, selection, offsets)
-        for run, epoch in _epochs_in(read):
-            writer.runs[run] = epoch, poses(run[0], epoch) if selection.transforms else None
-        for path, found in chain.from_iterable(in_order):
-            with found.opened(path) as content:
-                try:
-                    writer.add(content, found)
-                except (ValueError, LookupError, struct.error) as error:
-                    raise RecordingError(f"{path} is damaged: {error!r:.200}") from error
-        for run, epoch in _epochs_in(read):
-            writer.add_end(run, epoch)
-        file.finish()
-    except OSError as error:
-        file.close()
-        output.unlink(missing_ok=True)
-        raise RecordingError(f"{output} cannot be written: {reason(output, error)}") from error
+        with writing(output, RecordingError):
+            writer = _PartWriter(file, selection, offsets)
+            for name, _, epoch in runs:
+                bodies = poses(name, epoch) if selection.transforms else None
+                writer.runs[name, epoch.epoch] = epoch, bodies
+            for path, found in chain.from_iterable(in_order):
+                with found.opened(path) as content:
+                    try:
+                        writer.add(content, found)
+                    except (ValueError, LookupError, struct.error) as error:
+                        raise RecordingError(f"{path} is damaged: {error!r:.200}") from error
+            for name, _, epoch in runs:
+                writer.add_end((name, epoch.epoch), epoch)
+            file.finish()
     except BaseException:
         file.close()
         output.unlink(missing_ok=True)
         raise
     return writer.rows
-
-
-def _epochs_in(recordings: Sequence[RecordingFile]) -> Iterator[tuple[Run, RecordedEpoch]]:
-    for recording in recordings:
-        for name in recording:
-            for epoch in recording[name].epochs:
-                yield (name, epoch.epoch), epoch
 
 
 def _notes_in(found: Scan) -> Iterator[EpochNote]:
@@ -132,7 +124,7 @@ class _PartWriter:
         self.rows: dict[str, tuple[int, int, int]] = {}
         self._file, self._selection, self._offsets = file, selection, offsets
         self._channels: dict[object, int] = {}
-        self._numbers: dict[Run, int] = {}  # number of each run in the new file
+        self._notes: dict[Run, EpochNote] = {}  # of each run, with its number in the new file
         self._next: dict[int, int] = {}  # next row or entry by new channel, to skip duplicates
         self._row_channels: dict[Run, int] = {}
         self._seen: set[tuple[str, int, bytes]] = set()
@@ -165,8 +157,7 @@ class _PartWriter:
         if run not in self._derivers:
             derivers = self._derivers[run] = []
             if (note.segment, note.number) in self._joint_channels:
-                new = replace(note, number=self._numbers[run])
-                joints = JointWriter.added_to(self._file, epoch.layout, new, None)
+                joints = JointWriter.added_to(self._file, epoch.layout, self._notes[run], None)
                 derivers += [joints] if joints else []
             if poses is not None and poses.bodies:
                 rate = self._selection.transforms
@@ -187,8 +178,8 @@ class _PartWriter:
             texts = epoch.end_record[1] or texts
             if epoch.gaps and epoch.gaps[-1].last is None:
                 texts = {"last": str(kept - 1), "reason": epoch.gaps[-1].reason}
-        name = f"{run[0]}/{self._numbers[run]}/end"
-        self._file.add_metadata(name, texts | self._run_texts(run))
+        note = self._notes[run]
+        self._file.add_metadata(note.record("end"), texts | note.run_texts())
 
     def _blocks(self, chunk: ChunkIndex) -> Iterator[Block]:
         found, content = self._found, self._content
@@ -225,7 +216,7 @@ class _PartWriter:
     def _rows(
         self, channel: Channel, note: EpochNote, messages: Iterable[tuple[int, bytes]]
     ) -> list[tuple[int, bytes]]:
-        kept = []
+        kept, run = [], (note.segment, note.epoch)
         for time, message in messages:
             iteration = iteration_in(message)
             if not self._selection.holds(time) or iteration % self._selection.every:
@@ -234,10 +225,10 @@ class _PartWriter:
             after = self._next.get(new, iteration)
             if iteration >= after:
                 if iteration > after and self._every(channel) == 1:
-                    texts = self._run_texts((note.segment, note.epoch))
-                    texts |= {"first": str(after), "last": str(iteration - 1)}
-                    self._file.add_metadata(GAP, texts | {"reason": self._reason(note, after)})
-                self._row_channels[note.segment, note.epoch] = new
+                    texts = {"first": str(after), "last": str(iteration - 1)}
+                    texts |= self._notes[run].run_texts() | {"reason": self._reason(note, after)}
+                    self._file.add_metadata(GAP, texts)
+                self._row_channels[run] = new
                 self._next[new] = iteration + 1
                 kept.append((time, message))
                 count, first, _ = self.rows.get(note.segment, (0, iteration, iteration))
@@ -272,9 +263,8 @@ class _PartWriter:
     def _begin_run(self, note: EpochNote) -> None:
         """Copies description and provenance of a run, under its number in the new file."""
         found, content = self._found, self._content
-        numbers = [number for (name, _), number in self._numbers.items() if name == note.segment]
-        number = self._numbers[note.segment, note.epoch] = len(numbers)
-        new = replace(note, number=number)
+        number = sum(name == note.segment for name, _ in self._notes)
+        new = self._notes[note.segment, note.epoch] = replace(note, number=number)
         for place in found.attachments:
             if place.name == note.record("description"):
                 old = attachment_of(content, place)
@@ -312,16 +302,12 @@ class _PartWriter:
         """Returns the metadata of a run's channel, with the run's number in the new file."""
         run = _run_of(channel)
         assert run is not None
-        if run not in self._numbers:
-            notes = (EpochNote.of(each.metadata) for each in self._found.channels.values())
-            for note in notes:
-                if note is not None and (note.segment, note.epoch) == run:
-                    self._begin_run(note)
-                    break
-        return channel.metadata | {"number": str(self._numbers.get(run, 0))}
-
-    def _run_texts(self, run: Run) -> dict[str, str]:
-        return {"segment": run[0], "epoch": str(run[1]), "number": str(self._numbers[run])}
+        if run not in self._notes:
+            notes = (each for each in _notes_in(self._found) if (each.segment, each.epoch) == run)
+            for note in islice(notes, 1):  # none: another program left out its rows
+                self._begin_run(note)
+        new = self._notes.get(run)
+        return channel.metadata | ({} if new is None else {"number": str(new.number)})
 
     def _every(self, channel: Channel) -> int:
         """Row interval of a channel in the output, earlier thinning included."""

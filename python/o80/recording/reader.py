@@ -25,9 +25,9 @@ class RecordingFile:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
-        self._files = [*_scans_of(self.path)]
+        self.scans = [*_scans_of(self.path)]  #: files of the recording and their contents, in order
         parts: dict[str, dict[tuple[int, int], list[EpochPart]]] = {}
-        for file, found in self._files:
+        for file, found in self.scans:
             for part in parts_of(file, found):
                 epochs = parts.setdefault(part.note.segment, {})
                 epochs.setdefault((part.note.number, part.note.epoch), []).append(part)
@@ -40,23 +40,18 @@ class RecordingFile:
     def _cut_at(self) -> Path | None:
         """Returns the last file with rows, if the recorder was killed as it began the next file."""
         files = in_order(self.path) if self.path.is_dir() else []
-        begun = [file for file, found in self._files if found.channels]
+        begun = [file for file, found in self.scans if found.channels]
         return begun[-1] if begun and files and begun[-1] != files[-1] else None
 
     @property
     def finished(self) -> bool:
         """True if the recorder ended in order; else `o80 repair` completes the file for others."""
-        return all(found.finished for _, found in self._files)
-
-    @property
-    def scans(self) -> "list[tuple[Path, Scan]]":
-        """Files of the recording and their contents, in order."""
-        return self._files
+        return all(found.finished for _, found in self.scans)
 
     @property
     def time_range(self) -> tuple[int, int]:
         """First and last wall-clock time [ns since 1970]. Raises RecordingError if it is empty."""
-        files = [found.chunks for _, found in self._files if found.chunks]
+        files = [found.chunks for _, found in self.scans if found.chunks]
         if not files:
             raise RecordingError(f"{self.path} has no message")
         return min(chunks.start for chunks in files), max(chunks.end for chunks in files)
@@ -64,13 +59,13 @@ class RecordingFile:
     @property
     def size(self) -> int:
         """Size of all files [bytes]."""
-        return sum(size_of(path) for path, _ in self._files)
+        return sum(size_of(path) for path, _ in self.scans)
 
     @cached
     def marks(self) -> list[Mark]:
         """Marks in the recording, in order. Raises RecordingError if a file is damaged."""
         marks = Marks()
-        for path, found in self._files:
+        for path, found in self.scans:
             try:
                 with found.opened(path) as file:
                     marks += marks_in(file, found)
@@ -89,6 +84,12 @@ class RecordingFile:
             if name in mark.rows:
                 runs[max(bisect(begins, mark.time) - 1, 0)].append(mark)
         return runs
+
+    def runs(self, names: Iterable[str] | None = None) -> Iterator[tuple[str, int, RecordedEpoch]]:
+        """Yields segment, number and epoch of each run of these segments, or of all."""
+        for name in self.chosen(names):
+            for number, epoch in enumerate(self.segments[name].epochs):
+                yield name, number, epoch
 
     def chosen(self, names: Iterable[str] | None = None) -> list[str]:
         """Returns these segments, or all. Raises InvalidArgument for a segment that is missing."""
@@ -210,7 +211,7 @@ class RecordedSegment(Histories):
         if len(self.epochs) != 1:
             raise InvalidArgument(
                 f"segment '{self.name}' has {len(self.epochs)} epochs, because its robot was "
-                f"restarted: choose one, for example .epochs[-1].history()"
+                f"restarted: choose one, for example recording['{self.name}'].epochs[-1]"
             )
         return self.epochs[0]
 

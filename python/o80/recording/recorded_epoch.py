@@ -21,10 +21,10 @@ from o80.recording.blocks import messages_in
 from o80.recording.epoch import GAP, OVERWRITTEN, Gap, Interruption, iteration_in
 from o80.recording.epoch_part import EpochPart
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
-from o80.recording.journal_channel import Entries, codec_of, entries_in
+from o80.recording.journal_channel import Entries, codec_of
 from o80.recording.message_plan import Bytes, Copy, MessagePlan
 from o80.recording.message_types import row_type
-from o80.recording.scan import content_of, index_of
+from o80.recording.scan import content_of
 from o80.rows.columns import packing_at
 from o80.rows.history import History, Range, Selection
 from o80.rows.journal import EntryDecoder, JournalEntry
@@ -77,26 +77,15 @@ class RecordedEpoch(Histories):
         """parts: in order, at least one. lacks_end: why no record states how the run ended."""
         self._parts = parts
         self._lacks_end = lacks_end
-        self._note = parts[0].note
+        self._note = note = parts[0].note
+        self.epoch = note.epoch  #: number of the run; see `Frontend.epoch`
+        self.first_row = note.begin  #: iteration of the first recorded row
+        self.wall_offset = note.wall_offset  #: wall-clock time [ns since 1970] minus row time
+        self.boot = note.boot  #: id of the boot whose clock the row times use; empty: unknown
 
     @property
     def _run(self) -> "RecordedEpoch":
         return self
-
-    @property
-    def epoch(self) -> int:
-        """The number of the run; see `Frontend.epoch`."""
-        return self._note.epoch
-
-    @property
-    def wall_offset(self) -> int:
-        """Wall-clock time [ns since 1970] minus row time."""
-        return self._note.wall_offset
-
-    @property
-    def boot(self) -> str:
-        """Id of the boot whose monotonic clock the row times use; empty: unknown."""
-        return self._note.boot
 
     @property
     def rows(self) -> int:
@@ -151,7 +140,9 @@ class RecordedEpoch(Histories):
         last, texts = self.end_record
         why = texts.get("reason") or self._parts[-1].why_cut
         if last >= after:
-            return [*found, Gap(after, last, "the recorder ended before it had read them")]
+            every = self._parts[-1].every
+            unread = "the recorder ended before it had read them"
+            return [*found, Gap(after, last, unread if last >= after + every - 1 else _kept(every))]
         why = why or ("" if texts else self._lacks_end)
         if why and not self.end:
             return [*found, Gap(after, None, why)]
@@ -178,8 +169,8 @@ class RecordedEpoch(Histories):
                 after += last - first + 1
             if part.every > 1 and part.rows:
                 after = part.last_row + 1
-                reason = f"every {part.every}th row was kept"
-                found.append(Gap(part.note.begin + 1, after - 1, reason))
+                if part.rows > 1:
+                    found.append(Gap(part.note.begin + 1, after - 1, _kept(part.every)))
         return found, after
 
     @property
@@ -231,22 +222,14 @@ class RecordedEpoch(Histories):
         return self._started("machine", Machine.from_json)
 
     def _started(self, key: str, read: Callable[[str], T]) -> T:
+        part, record = self._parts[0], self._note.record("provenance")
+        found = [each.metadata for each in part.found.metadata if each.name == record]
+        if not found:
+            raise RecordingError(f"{part.path} does not say how '{self._note.segment}' was started")
         try:
-            return read(self._provenance_texts[key])
+            return read(found[0][key])
         except (KeyError, TypeError, ValueError, RecursionError) as error:
-            raise RecordingError(
-                f"{self._parts[0].path}: the record {self._note.record('provenance')} is damaged"
-            ) from error
-
-    @cached
-    def _provenance_texts(self) -> dict[str, str]:
-        for each in self._parts[0].found.metadata:
-            if each.name == self._note.record("provenance"):
-                texts: dict[str, str] = each.metadata
-                return texts
-        raise RecordingError(
-            f"{self._parts[0].path} does not say how '{self._note.segment}' was started"
-        )
+            raise RecordingError(f"{part.path}: the record {record} is damaged") from error
 
     @cached
     def _decoder(self) -> Any:
@@ -282,9 +265,8 @@ class RecordedEpoch(Histories):
         For recordings larger than the memory. Raises RecordingError if this part is damaged.
         """
         for part, chunk in self._having(from_time, to_time):
-            with part.reading() as file:
-                messages = messages_in(content_of(file, chunk), index_of(file, chunk, part.channel))
-                rows = self.decoded(messages)
+            with part.reading():
+                rows = self.decoded(part.messages(chunk))
             history = self._history(rows).select(from_time=from_time, to_time=to_time)
             if len(history):
                 yield history
@@ -365,11 +347,6 @@ class RecordedEpoch(Histories):
         return rows
 
     @property
-    def first_row(self) -> int:
-        """Iteration of the first recorded row."""
-        return self._note.begin
-
-    @property
     def end(self) -> str:
         """How the run ended: "stopped", "killed", "superseded", or "failed: " with the reason.
 
@@ -387,14 +364,7 @@ class RecordedEpoch(Histories):
         return (found[-1][0][0], found[-1][1]) if found else (-1, {})
 
     def _end_in_journal(self) -> str:
-        part = next((part for part in reversed(self._parts) if part.journal is not None), None)
-        codec = self.journal_codec
-        if part is None or codec is None or codec > _core.JOURNAL_CODEC:
-            return ""
-        last = part.last_entries()
-        if last is None:
-            return ""
-        entries = self._decoded(_core.RecordedJournal(self.description, 0), last)
+        entries = [*self.last_entries(1)]
         if not entries or entries[-1].kind != "ended":
             return ""
         return f"failed: {entries[-1].text}" if entries[-1].text else "stopped"
@@ -426,8 +396,12 @@ class RecordedEpoch(Histories):
     def last_entries(self, most: int) -> Iterator[_core.JournalEntry]:
         """Yields the newest entries, at least `most` or all of them, the newest chunk first.
 
-        Batches whose records are split over two chunks come without records. Raises RecordingError.
+        None if a newer o80 wrote the journal. Batches whose records are split over two chunks come
+        without records. Raises RecordingError.
         """
+        codec = self.journal_codec
+        if codec is None or codec > _core.JOURNAL_CODEC:
+            return
         for part in self.journal_parts(newest_first=True):
             found = self._decoded(_core.RecordedJournal(self.description, 0), part)
             yield from found
@@ -480,9 +454,7 @@ class RecordedEpoch(Histories):
         Raises RecordingError if this part of the file is damaged.
         """
         for part in reversed(self._parts) if newest_first else self._parts:
-            if part.journal is not None:
-                with part.reading() as file:
-                    yield from entries_in(file, part.found, part.journal, newest_first=newest_first)
+            yield from part.entries(newest_first=newest_first)
 
     def _decoded(self, native: _core.RecordedJournal, part: Entries) -> list[_core.JournalEntry]:
         try:
@@ -492,6 +464,10 @@ class RecordedEpoch(Histories):
 
     def __repr__(self) -> str:
         return f"<epoch of {self._note.segment}: {self.rows} rows>"
+
+
+def _kept(every: int) -> str:
+    return f"every {every}th row was kept"
 
 
 def _first_row(chunk: tuple[EpochPart, ChunkIndex]) -> int:

@@ -19,7 +19,7 @@ from mcap.records import Attachment, Channel, Chunk, Metadata, Schema
 from mcap.stream_reader import get_chunk_data_stream
 
 from o80.base.errors import RecordingError
-from o80.base.unwritable import reason
+from o80.base.unwritable import writing
 from o80.recording.blocks import LENGTH_ENDS_AT, MESSAGE, MESSAGE_STRUCT, Block
 from o80.recording.chunks import HEAD
 from o80.recording.epoch import GAP, EpochNote, iteration_in
@@ -33,6 +33,7 @@ from o80.recording.reader import errors_explained
 from o80.recording.scan import CUT, MAGIC, Scan, damage_in, has_end, scan
 
 REASON = "damaged"
+READ = mmap.ACCESS_READ
 _KEPT: dict[Opcode, Any] = {
     Opcode.SCHEMA: Schema,
     Opcode.CHANNEL: Channel,
@@ -83,7 +84,7 @@ def _has_data_behind(path: Path, found: Scan) -> bool:
     if found.finished:
         return False
     of_data = (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.METADATA)  # the summary has others
-    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=READ) as data:
         parts = _parts(data, found.end)
         return any(part.opcode in of_data and part.begin > found.end for part in parts)
 
@@ -92,27 +93,24 @@ def _salvaged(path: Path, found: Scan | None, is_last: bool) -> list[str]:
     new, kept = (path.with_name(f"{path.name}.{each}") for each in ("repaired", "damaged"))
     if kept.exists():
         raise RecordingError(f"{kept} exists: {path} was repaired before; move it away first")
-    try:
-        lock = LockedFile(path, 0)
-    except BlockingIOError:
-        raise RecordingError(f"{path} is being written by a recorder: end it first") from None
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be written: {reason(path, error)}") from error
-    new.unlink(missing_ok=True)  # left by a killed repair
-    file = opened(new, proceed=False)
-    try:
-        with path.open("rb") as old, mmap.mmap(old.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            salvage = _Salvage(data, file, found)
-            dropped = salvage.run(is_last, was_cut=not has_end(path))
-        file.finish()
-        path.rename(kept)
-        new.rename(path)
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be repaired: {error.strerror}") from error
-    finally:
-        file.close()
-        new.unlink(missing_ok=True)
-        lock.close()
+    with writing(path, RecordingError):
+        try:
+            lock = LockedFile(path, 0)
+        except BlockingIOError:
+            raise RecordingError(f"{path} is being written by a recorder: end it first") from None
+        new.unlink(missing_ok=True)  # left by a killed repair
+        file = opened(new, proceed=False)
+        try:
+            with path.open("rb") as old, mmap.mmap(old.fileno(), 0, access=READ) as data:
+                salvage = _Salvage(data, file, found)
+                dropped = salvage.run(is_last, was_cut=not has_end(path))
+            file.finish()
+            path.rename(kept)
+            new.rename(path)
+        finally:
+            file.close()
+            new.unlink(missing_ok=True)
+            lock.close()
     ranges = [
         f"{path}: bytes {each.begin} to {each.end - 1} were damaged and are dropped"
         for each in dropped

@@ -13,35 +13,37 @@ from o80.recording.file_writer import FileWriter
 from o80.recording.joint_states import JointWriter
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import PACKAGE, row_type
-from o80.rows.layout import Layout
 
 
 class RowWriter:
     """Converts the rows of one epoch to messages."""
 
     def __init__(
-        self, layout: "Layout", note: EpochNote, channel: int, joints: JointWriter | None
+        self,
+        file: FileWriter,
+        frontend: Reader,
+        note: EpochNote,
+        channel: int | None = None,
+        joints: int | None = None,
     ) -> None:
-        self.note = note
-        self.channel = channel
-        self._joints = joints
-        self._plan = MessagePlan(row_type(layout))
-
-    @classmethod
-    def added_to(cls, file: "FileWriter", frontend: "Reader", note: EpochNote) -> "RowWriter":
-        """Adds message types, description and channels of an epoch to a file."""
+        """channel, joints: channels of the epoch in a file that is continued; what is missing, of
+        message types, description and channels, is added.
+        """
         layout = frontend._layout
         message = row_type(layout)
-        schema = file.add_schema(f"{PACKAGE}/msg/{message.name}", message.definition)
-        file.attach(
-            note.record("description"), DESCRIPTION, frontend._description.table(), time.time_ns()
-        )
-        file.add_metadata(
-            note.record("provenance"),
-            {"json": frontend.provenance.as_json(), "machine": this_machine().as_json()},
-        )
-        channel = file.add_channel(topic_of(note.segment), schema, note.texts())
-        return cls(layout, note, channel, JointWriter.added_to(file, layout, note, None))
+        if channel is None:
+            schema = file.add_schema(f"{PACKAGE}/msg/{message.name}", message.definition)
+            table = frontend._description.table()
+            file.attach(note.record("description"), DESCRIPTION, table, time.time_ns())
+            file.add_metadata(
+                note.record("provenance"),
+                {"json": frontend.provenance.as_json(), "machine": this_machine().as_json()},
+            )
+            channel = file.add_channel(topic_of(note.segment), schema, note.texts())
+        self.note = note
+        self.channel = channel
+        self._joints = JointWriter.added_to(file, layout, note, joints)
+        self._plan = MessagePlan(message)
 
     def blocks(self, rows: NDArray[np.void]) -> list[Block]:
         """Encodes consecutive rows; for a robot with joints, also as joint states."""

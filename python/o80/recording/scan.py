@@ -30,7 +30,6 @@ from mcap.records import (
     Chunk,
     ChunkIndex,
     Footer,
-    Header,
     Metadata,
     MetadataIndex,
     Schema,
@@ -72,17 +71,14 @@ class Scan:
     end: int = 0  #: end of the last whole group [bytes]
     finished: bool = False  #: the file has a summary and a footer
     summarized: bool = False  #: the summary is complete
-    library: str = ""
     #: messages outside of chunks, chunks without indexes or with channels of their own: another
     #: program has written them
     foreign: bool = False
     copy: "CopiedFile | None" = None  #: copy of a foreign file in the form of o80, scanned instead
 
     def take(self, opcode: int, stream: ReadDataStream) -> None:
-        """Notes a header, a schema or a channel; nothing else."""
-        if opcode == Opcode.HEADER:
-            self.library = Header.read(stream).library
-        elif opcode == Opcode.SCHEMA:
+        """Notes a schema or a channel; nothing else."""
+        if opcode == Opcode.SCHEMA:
             schema = Schema.read(stream)
             self.schemas[schema.id] = schema
         elif opcode == Opcode.CHANNEL:
@@ -226,9 +222,6 @@ def _summary(file: IO[bytes], size: int) -> Scan | None:
     for place in found.metadata_places:
         file.seek(place.offset + HEAD.size)
         found.metadata.append(Metadata.read(ReadDataStream(BytesIO(file.read(place.length)))))
-    file.seek(len(MAGIC))
-    opcode, length = HEAD.unpack(file.read(HEAD.size))
-    found.take(opcode, ReadDataStream(BytesIO(file.read(length))))
     return found
 
 
@@ -289,110 +282,96 @@ class _Scanner:
     def __init__(self, file: IO[bytes], size: int, path: str | os.PathLike[str]) -> None:
         self._file, self._size, self._path = file, size, path
         self._scan = Scan(end=len(MAGIC))
-        self._chunk: ChunkIndex | None = None  # the chunk whose message indexes are being read
-
-    def run(self) -> Scan:
-        progress = Progress(
-            f"{self._path} has no summary (its recorder was killed, or still records), so all of "
+        self._records = 0
+        self._progress = Progress(
+            f"{path} has no summary (its recorder was killed, or still records), so all of "
             f"it is scanned. o80 repair adds a summary"
         )
-        with progress:
-            self._read_records(progress)
-        self._end_chunk(self._whole_at_the_end())
-        return self._scan
 
-    def _read_records(self, progress: Progress) -> None:
-        at = self._file.seek(len(MAGIC))
-        records = 0
-        while at + HEAD.size <= self._size:
-            records += 1
-            if records % BETWEEN_FIGURES == 0:
-                progress.at(at / self._size)
-            opcode, length = HEAD.unpack(self._file.read(HEAD.size))
-            after = at + HEAD.size + length
-            if after > self._size:
-                break
-            if opcode == Opcode.DATA_END:
-                self._scan.finished = _footer(self._file, self._size) is not None
-                break
-            try:
-                belongs = self._take(opcode, at, length)
-            except DAMAGED as error:
-                raise RecordingError(f"{self._path}: the record at byte {at} is damaged") from error
-            if not belongs:
-                break
-            self._file.seek(after)
-            at = after
-
-    def _take(self, opcode: int, at: int, length: int) -> bool:
-        """Adds one record; False if its kind is invalid at this place."""
-        if opcode == Opcode.MESSAGE_INDEX:
-            return self._take_index(at, length)
-        self._end_chunk(whole=True)
-        after = at + HEAD.size + length
-        if opcode == Opcode.CHUNK:
-            return self._begin_chunk(at, length)
-        stream = ReadDataStream(BytesIO(self._file.read(length)))
+    def run(self) -> Scan:
         scan = self._scan
+        with self._progress:
+            while (record := self._record_at(scan.end)) is not None:
+                opcode, at, length = record
+                if opcode == Opcode.DATA_END:
+                    scan.finished = _footer(self._file, self._size) is not None
+                    break
+                if opcode == Opcode.MESSAGE_INDEX:  # of no chunk
+                    break
+                try:
+                    if opcode != Opcode.CHUNK:
+                        self._take(*record)
+                    elif not self._take_chunk(at, length):
+                        break
+                except DAMAGED as error:
+                    raise RecordingError(
+                        f"{self._path}: the record at byte {at} is damaged"
+                    ) from error
+        return scan
+
+    def _record_at(self, at: int) -> tuple[int, int, int] | None:
+        """Reads the head of a record: opcode, offset, length; None if it is not whole."""
+        self._records += 1
+        if self._records % BETWEEN_FIGURES == 0:
+            self._progress.at(at / self._size)
+        self._file.seek(at)
+        head = self._file.read(HEAD.size)
+        if len(head) < HEAD.size:
+            return None
+        opcode, length = HEAD.unpack(head)
+        return (opcode, at, length) if at + HEAD.size + length <= self._size else None
+
+    def _take(self, opcode: int, at: int, length: int) -> None:
+        """Adds a record that belongs to no chunk."""
+        stream = ReadDataStream(BytesIO(self._file.read(length)))
+        scan, whole = self._scan, HEAD.size + length
         scan.take(opcode, stream)
         if opcode == Opcode.ATTACHMENT:
-            scan.attachments.append(place_of(Attachment.read(stream), at, after - at))
+            scan.attachments.append(place_of(Attachment.read(stream), at, whole))
         elif opcode == Opcode.MESSAGE:
             scan.foreign = True
         elif opcode == Opcode.METADATA:
             metadata = Metadata.read(stream)
             scan.metadata.append(metadata)
-            scan.metadata_places.append(MetadataIndex(at, after - at, metadata.name))
-        scan.end = after
-        return True
+            scan.metadata_places.append(MetadataIndex(at, whole, metadata.name))
+        scan.end = at + whole
 
-    # a chunk and the message indexes after it
-
-    def _begin_chunk(self, at: int, length: int) -> bool:
+    def _take_chunk(self, at: int, length: int) -> bool:
+        """Adds a chunk and the message indexes after it; False if these are incomplete."""
         start, end, size, _crc, named = CHUNK_HEAD.unpack(self._file.read(32))
         compression = self._file.read(named).decode()
         (compressed,) = struct.unpack("<Q", self._file.read(8))
-        self._chunk = ChunkIndex(
-            chunk_length=HEAD.size + length,
-            chunk_start_offset=at,
-            compression=compression,
-            compressed_size=compressed,
-            message_end_time=end,
-            message_index_length=0,
-            message_index_offsets={},
-            message_start_time=start,
-            uncompressed_size=size,
-        )
-        self._counts: dict[int, int] = {}
-        return True
-
-    def _take_index(self, at: int, length: int) -> bool:
-        if self._chunk is None:
+        offsets, counts = {}, {}
+        indexes = after = at + HEAD.size + length
+        while (record := self._record_at(after)) and record[0] == Opcode.MESSAGE_INDEX:
+            channel, of_entries = struct.unpack("<HI", self._file.read(6))
+            offsets[channel], counts[channel] = after, of_entries // 16
+            after += HEAD.size + record[2]
+        if record is None and self._channels_in(at) != offsets.keys():
             return False
-        channel, size = struct.unpack("<HI", self._file.read(6))
-        self._chunk.message_index_offsets[channel] = at
-        self._chunk.message_index_length += HEAD.size + length
-        self._counts[channel] = size // 16
+        self._scan.chunks.append(
+            ChunkIndex(
+                chunk_length=HEAD.size + length,
+                chunk_start_offset=at,
+                compression=compression,
+                compressed_size=compressed,
+                message_end_time=end,
+                message_index_length=after - indexes,
+                message_index_offsets=offsets,
+                message_start_time=start,
+                uncompressed_size=size,
+            )
+        )
+        for channel, count in counts.items():
+            self._scan.counts[channel] = self._scan.counts.get(channel, 0) + count
+        self._scan.end = after
         return True
 
-    def _end_chunk(self, whole: bool) -> None:
-        chunk, self._chunk = self._chunk, None
-        if chunk is None or not whole:
-            return
-        self._scan.chunks.append(chunk)
-        for channel, count in self._counts.items():
-            self._scan.counts[channel] = self._scan.counts.get(channel, 0) + count
-        self._scan.end = chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
-
-    def _whole_at_the_end(self) -> bool:
-        """True if the last chunk has all its message indexes."""
-        chunk = self._chunk
-        if chunk is None or self._scan.finished:
-            return True
-        self._file.seek(chunk.chunk_start_offset + HEAD.size)
+    def _channels_in(self, chunk: int) -> set[int] | None:
+        """Returns the channels of the messages in the chunk at this offset; None: it is damaged."""
+        self._file.seek(chunk + HEAD.size)
         try:
             records = breakup_chunk(Chunk.read(ReadDataStream(self._file)), validate_crc=True)
         except Exception:  # cut, or damaged
-            return False
-        channels = {record.channel_id for record in records if hasattr(record, "channel_id")}
-        return channels == set(chunk.message_index_offsets)
+            return None
+        return {record.channel_id for record in records if hasattr(record, "channel_id")}

@@ -10,7 +10,6 @@ from o80.frontend.frontend import Frontend
 from o80.recording.blocks import Block
 from o80.recording.epoch import EARLIER_FILE, GAP, WallClock, note_of
 from o80.recording.file_writer import FileWriter
-from o80.recording.joint_states import JointWriter
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import JournalRecorder, codec_of
 from o80.recording.log_channel import ERROR, INFO, JournalLog, Line
@@ -167,12 +166,7 @@ class Source:
         note = replace(known.note, begin=self._next)
         if known.last >= 0:
             note = replace(note, before=EARLIER_FILE)
-        if known.channel is None:
-            self._writer = RowWriter.added_to(self._file, frontend, note)
-        else:
-            layout = frontend._layout
-            joints = JointWriter.added_to(self._file, layout, note, known.joints)
-            self._writer = RowWriter(layout, note, known.channel, joints)
+        self._writer = RowWriter(self._file, frontend, note, known.channel, known.joints)
         self._refuse_other_format(known)
         journal = JournalRecorder(frontend, known.journal, known.journal_next)
         self._journal = journal if journal.exists else None
@@ -207,7 +201,7 @@ class Source:
         if self.frontend is None or self._writer is None:
             return
         note = replace(self._writer.note, begin=self._next, before=EARLIER_FILE)
-        self._writer = RowWriter.added_to(file, self.frontend, note)
+        self._writer = RowWriter(file, self.frontend, note)
         if self._journal is not None:
             self._journal.add_channel(file, note)
 

@@ -18,20 +18,6 @@ def reads_the_world(schema: dict[str, Any]) -> str:
     )
 
 
-def blended_columns(schema: dict[str, Any]) -> list[str]:
-    """Returns the columns of desired states whose interpolation is code of the driver."""
-    return [
-        f"desired.{actuator['name']}"
-        for actuator in schema["actuators"]
-        if _blends(schema["groups"][actuator["group"]]["type"])
-    ]
-
-
-def _blends(described: dict[str, Any]) -> bool:
-    nested = (field["type"] for field in described["fields"] if field["kind"] == "struct")
-    return described.get("blends", False) or any(map(_blends, nested))
-
-
 def changes(recorded: Provenance, now: Provenance) -> list[str]:
     """Returns texts about changed files that may explain a difference between run and replay."""
     found = []

@@ -1,7 +1,6 @@
 """Passes journal entries to a replay, just before the rows in which they act."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import o80._core as _core
@@ -74,7 +73,6 @@ class EntryFeed:
         return pending if pending is not None else next(self._entries, None)
 
 
-@dataclass(frozen=True)
 class MotionRules:
     """Versions of the motion rules of a recorded run and of this o80.
 
@@ -82,25 +80,12 @@ class MotionRules:
     is a speed limit (an acceleration limit needs one) or a value at rest, or with another profile.
     """
 
-    recorded: int
-    now: int
-    names: tuple[str, ...]  #: names of all actuators
-    limited: frozenset[int]  #: indices of the actuators with a speed limit or a value at rest
+    now = _core.MOTION_RULES
 
-    @classmethod
-    def of(cls, schema: dict[str, Any], recorded: int, now: int) -> "MotionRules":
-        actuators = list(enumerate(schema["actuators"]))
-        limited = (
-            number
-            for number, actuator in actuators
-            if any(each["speed"] is not None or "rest" in each for each in actuator["limits"])
-        )
-        names = (actuator["name"] or f"actuator {number}" for number, actuator in actuators)
-        return cls(recorded, now, tuple(names), frozenset(limited))
-
-    @property
-    def differ(self) -> bool:
-        return self.recorded != self.now
+    def __init__(self, schema: dict[str, Any], recorded: int) -> None:
+        self.recorded = recorded
+        self.differ = recorded != self.now
+        self._actuators = schema["actuators"]
 
     def moved_otherwise(self, entry: _core.JournalEntry) -> str:
         """Returns the name of the first actuator that this entry may move differently, or ""."""
@@ -108,8 +93,11 @@ class MotionRules:
             return ""
         for record in entry.records:
             for target in record.targets:
-                if target.actuator in self.limited or record.profile != "linear":
-                    return self.names[target.actuator]
+                actuator = self._actuators[target.actuator]
+                limits = actuator["limits"]
+                limited = any(each["speed"] is not None or "rest" in each for each in limits)
+                if limited or record.profile != "linear":
+                    return actuator["name"] or f"actuator {target.actuator}"
         return ""
 
     def __str__(self) -> str:

@@ -98,8 +98,4 @@ RecordedRun = LiveRun | FileRun
 
 def runs_in(recording: "RecordingFile", segment: str | None = None) -> list[FileRun]:
     """Returns the runs of all segments, or of one. Raises InvalidArgument if that is unknown."""
-    return [
-        FileRun(name, number, epoch)
-        for name in recording.chosen(None if segment is None else [segment])
-        for number, epoch in enumerate(recording[name].epochs)
-    ]
+    return [FileRun(*run) for run in recording.runs(None if segment is None else [segment])]

@@ -14,13 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import o80._core as _core
 from o80.base.errors import DriverError, InvalidArgument, RecordingError, sentence
 from o80.frontend.frontend import Frontend
 from o80.joining.difference import Difference, RobotsDifferError, first_difference, same_bytes
 from o80.replaying.conditions import (
     TOLERANCE,
-    blended_columns,
     changes,
     other_arithmetic,
     reads_the_world,
@@ -30,7 +28,6 @@ from o80.replaying.recorded_run import ROWS_AT_ONCE, LiveRun, RecordedRun, runs_
 from o80.replaying.report import ReplayReport, RunReport
 from o80.replaying.runner import OtherRobot, Runner, with_driver, without_driver
 from o80.replaying.start import (
-    Requests,
     SlotsKept,
     Start,
     find_fresh_start,
@@ -38,6 +35,7 @@ from o80.replaying.start import (
     find_rest,
     find_start,
 )
+from o80.rows.actuators import blending
 from o80.rows.columns import columns_of
 from o80.rows.history import History
 
@@ -171,7 +169,7 @@ class RunReplay:
         # without a driver, a restored snapshot is read as any other row
         known = Start() if self._no_driver else start
         rules = self._motion_rules()
-        slots = SlotsKept(Requests(self.run.schema), known)
+        slots = SlotsKept(self.run.schema, known)
         feed = EntryFeed(self.run.entries(), start, slots, rules)
         blocks = self._whole(self.run.blocks())
         first = next(blocks, None)
@@ -192,8 +190,7 @@ class RunReplay:
         return None
 
     def _motion_rules(self) -> MotionRules:
-        recorded = self.run.provenance.motion_rules
-        rules = MotionRules.of(self.run.schema, recorded, _core.MOTION_RULES)
+        rules = MotionRules(self.run.schema, self.run.provenance.motion_rules)
         if rules.differ:
             self._notes.append(
                 f"{rules}: rows are compared up to the first command that is not linear, or is of "
@@ -283,7 +280,7 @@ class RunReplay:
         )
         if self.robot or self.options:
             self._notes.append("the robot and the options that were given are not used")
-        if blended := blended_columns(self.run.schema):
+        if blended := [f"desired.{name}" for name in blending(self.run.schema)]:
             self.ignore = (*self.ignore, *blended)
             self._notes.append(
                 f"not compared, because code of the driver interpolates them: {', '.join(blended)}"

@@ -33,34 +33,31 @@ class Start:
     before: bytes = b""  #: at rest, with a driver: the preceding row
 
 
-class Requests:
-    """Reads names and slots of the requests in journal entries."""
-
-    def __init__(self, schema: dict[str, Any]) -> None:
-        self._names = [request["name"] for request in schema["requests"]]
-
-    def of(self, entry: "_core.JournalEntry") -> Iterator[tuple[str, int, int]]:
-        """Yields name, slot and id of each request of a batch; slot -1: the request has none."""
-        for record in entry.records:
-            if record.kind != "request":
-                continue
-            name = self._names[record.request] if record.request < len(self._names) else ""
-            has_slot = name in ("snapshot", "restore") and len(record.payload) >= 4
-            yield name, struct.unpack_from("<I", record.payload)[0] if has_slot else -1, record.id
+def requests_in(
+    entry: "_core.JournalEntry", schema: dict[str, Any]
+) -> Iterator[tuple[str, int, int]]:
+    """Yields name, slot and id of each request of a batch; slot -1: the request has none."""
+    known = schema["requests"]
+    for record in entry.records:
+        if record.kind != "request":
+            continue
+        name = known[record.request]["name"] if record.request < len(known) else ""
+        has_slot = name in ("snapshot", "restore") and len(record.payload) >= 4
+        yield name, struct.unpack_from("<I", record.payload)[0] if has_slot else -1, record.id
 
 
 class SlotsKept:
     """Tracks the slots whose snapshots the replay knows."""
 
-    def __init__(self, requests: Requests, start: Start) -> None:
-        self._requests, self._start = requests, start
+    def __init__(self, schema: dict[str, Any], start: Start) -> None:
+        self._schema, self._start = schema, start
         self._known = set(start.snapshots)
 
     def unknown(self, entry: "_core.JournalEntry") -> int | None:
         """Returns a slot that this batch restores although its snapshot is unknown, or None."""
         if entry.kind != "taken" or self._start.row == 0:
             return None
-        for name, slot, _ in self._requests.of(entry):
+        for name, slot, _ in requests_in(entry, self._schema):
             if name == "snapshot":
                 self._known.add(slot)
             elif name == "restore" and slot not in self._known:
@@ -113,7 +110,7 @@ def find_start(run: "RecordedRun", since: int) -> Start | None:
     journal holds. Nothing else may be active: no halt, no request that takes time.
     """
     begun = _fresh_starts(run)
-    requests, purges = Requests(run.schema), Purges(run.entries())
+    purges = Purges(run.entries())
     snapshots: dict[int, bytes] = {}
     sent: set[tuple[int, int]] = set()  # lane and id of requests
     running: set[tuple[int, int]] = set()
@@ -128,7 +125,7 @@ def find_start(run: "RecordedRun", since: int) -> Start | None:
             elif key in sent:
                 running.add(key)
         elif entry.kind == "taken":
-            named = list(requests.of(entry))
+            named = list(requests_in(entry, run.schema))
             first = named[0] if named else ("", -1, 0)
             is_start = entry.iteration >= since and entry.iteration in begun and not running
             is_start = is_start and not purges.reach_past(entry.number)
@@ -144,7 +141,7 @@ def find_kept(run: "RecordedRun", since: int) -> Start | None:
 
     The snapshot is the state after the preceding row, which has the desired states that continue.
     """
-    requests, purges = Requests(run.schema), Purges(run.entries())
+    purges = Purges(run.entries())
     found: dict[int, tuple[int, int]] = {}  # by iteration: number of the first and the last entry
     ends: _core.JournalEntry | None = None  # the batch that ended a stretch in which nothing acts
     began: _core.JournalEntry | None = None
@@ -157,7 +154,7 @@ def find_kept(run: "RecordedRun", since: int) -> Start | None:
             if began is not None and began.iteration < entry.iteration:
                 ends = entry
             began = None
-            others = any(name != "snapshot" for name, _, _ in requests.of(entry))
+            others = any(name != "snapshot" for name, _, _ in requests_in(entry, run.schema))
             if ends and (ends.iteration != entry.iteration or others or entry.records_lost):
                 ends = None
         elif entry.kind == "snapshot" and ends is not None and ends.iteration == entry.iteration:

@@ -91,21 +91,6 @@ class Number:
     limits: Limits
     rest: float | None  #: value that it approaches without a command; None: it holds or follows
 
-    @property
-    def minimum(self) -> float:
-        """The least value; -inf: not limited."""
-        return self.limits.minimum
-
-    @property
-    def maximum(self) -> float:
-        """The largest value; inf: not limited."""
-        return self.limits.maximum
-
-    @property
-    def speed(self) -> float:
-        """The largest speed [unit/s]; inf: not limited."""
-        return self.limits.speed
-
 
 @dataclass(frozen=True, kw_only=True)
 class Actuator:
@@ -127,26 +112,6 @@ class Actuator:
     def limits(self) -> Limits:
         """The limits of the first number."""
         return self.numbers[0].limits
-
-    @property
-    def unit(self) -> str:
-        """The unit of the first number."""
-        return self.numbers[0].unit
-
-    @property
-    def minimum(self) -> float:
-        """The least value of the first number."""
-        return self.numbers[0].minimum
-
-    @property
-    def maximum(self) -> float:
-        """The largest value of the first number."""
-        return self.numbers[0].maximum
-
-    @property
-    def speed(self) -> float:
-        """The largest speed of the first number [its unit/s]."""
-        return self.numbers[0].speed
 
 
 def _limits(described: dict[str, Any], paths: list[str]) -> Limits:
@@ -185,6 +150,12 @@ def actuators_of(schema: dict[str, Any]) -> list[Actuator]:
             )
         )
     return actuators
+
+
+def blending(schema: dict[str, Any]) -> list[str]:
+    """Names of the actuators whose states code of the driver interpolates (`blend`)."""
+    types = [group["type"] for group in schema["groups"]]
+    return [each["name"] for each in schema["actuators"] if "blends" in types[each["group"]]]
 
 
 class Actuators(list[Actuator]):

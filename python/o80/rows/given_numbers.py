@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.rows.actuators import actuators_of
+from o80.rows.actuators import actuators_of, blending
 from o80.rows.columns import numbers_below
 from o80.rows.layout import Layout, dtype_of_type
 from o80.rows.plans import NumberLimits, limits_of
@@ -31,9 +31,9 @@ class GivenNumbers:
         rows = [schema["actuators"][each] for each in actuators]
         types = [schema["groups"][row["group"]]["type"] for row in rows]
         self._sizes = [dtype_of_type(each).itemsize for each in types]
-        blends = (row["name"] for row, each in zip(rows, types, strict=True) if "blends" in each)
+        blends = blending(schema)
         #: the first actuator whose state interpolates by itself; empty: none
-        self.blends: str = next(blends, "")
+        self.blends = next((row["name"] for row in rows if row["name"] in blends), "")
         words = iter(masks)
         self._numbers: list[_Number] = []
         for place, described in enumerate(types):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from o80.rows.columns import Column
 
-LONGEST = 2.0**62  # duration [ns], 146 years
+LONGEST = 2**62  # duration [ns], 146 years
 _HEAD = ("iteration", "time", "lateness", "overruns", "skipped", "fresh", "halted", "starvations")
 _ENDS = 5  # rows of each end of a history that a notebook shows
 _COLUMNS = 16  # most numbers of a row that a notebook shows
@@ -67,8 +67,8 @@ class Selection:
             since=whole_or_none(since, "since"),
             until=whole_or_none(until, "until"),
             duration=None if seconds is None else _nanoseconds(seconds),
-            from_time=whole_or_none(from_time, "from_time"),
-            to_time=whole_or_none(to_time, "to_time"),
+            from_time=_moment(from_time, "from_time"),
+            to_time=_moment(to_time, "to_time"),
         )
 
     def range(
@@ -413,6 +413,12 @@ def _categories(pandas: Any, values: NDArray[Any], labels: dict[str, int]) -> An
     for code, value in enumerate(labels.values()):
         codes[values == value] = code
     return pandas.Categorical.from_codes(codes, list(labels))
+
+
+def _moment(time: int | None, name: str) -> int | None:
+    """Checks a time [ns], and clamps one that no clock reaches."""
+    checked = whole_or_none(time, name)
+    return None if checked is None else min(max(checked, -LONGEST), LONGEST)
 
 
 def _nanoseconds(seconds: float) -> int:

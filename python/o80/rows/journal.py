@@ -12,7 +12,7 @@ from o80.base.cached import cached
 from o80.base.words import CommandEnd, Reason, Status
 from o80.rows.actuators import actuators_of
 from o80.rows.enumerations import labelled
-from o80.rows.layout import dtype_of_type, is_plain, labels_of_type, request_fields
+from o80.rows.layout import count_of, dtype_of_type, is_plain, labels_of_type, request_fields
 from o80.rows.record import Record
 
 ENDS = frozenset(Status) - {Status.NONE, Status.QUEUED, Status.ACTIVE, Status.FORGOTTEN}
@@ -257,7 +257,8 @@ class EntryDecoder:
     def _target(self, native: _core.JournalTarget, rows: int) -> Any:
         """Returns the rows of one actuator; for a struct the given fields."""
         described = self._types[native.actuator]
-        states = np.frombuffer(native.states, dtype_of_type(described), rows)
+        kind = dtype_of_type(described)
+        states = np.frombuffer(native.states, kind, rows)
         known = labelled(states, labels_of_type(described))
         whole = known if rows > 1 else known[0]
         if is_plain(described):
@@ -265,7 +266,7 @@ class EntryDecoder:
         given = iter(_bits(native.mask)) if native.mask else None
         fields: dict[str, Any] = {}
         for field in described["fields"]:
-            bits = [given is None or next(given) for _ in range(_numbers(field))]
+            bits = [given is None or next(given) for _ in range(count_of(kind[field["name"]]))]
             if any(bits):
                 value = whole[field["name"]]
                 fields[field["name"]] = value.item() if isinstance(value, np.generic) else value
@@ -289,11 +290,3 @@ def _amount(native: _core.JournalRecord) -> float | None:
 def _bits(words: list[int]) -> Iterator[bool]:
     for word in words:
         yield from ((word >> bit) & 1 == 1 for bit in range(64))
-
-
-def _numbers(field: dict[str, Any]) -> int:
-    """Counts the numbers in a described field, like a mask."""
-    count = int(np.prod(field["shape"], dtype=int)) if field["shape"] else 1
-    if field["kind"] == "struct":
-        return count * sum(_numbers(part) for part in field["type"]["fields"])
-    return count

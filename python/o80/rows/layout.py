@@ -131,6 +131,11 @@ def runs_of(dtype: np.dtype[Any], offset: int) -> Iterator[tuple[np.dtype[Any], 
             yield from runs_of(member[0], offset + member[1])
 
 
+def count_of(dtype: np.dtype[Any]) -> int:
+    """Returns how many numbers a dtype holds."""
+    return sum(count for _, _, count in runs_of(dtype, 0))
+
+
 def joined(
     runs: Iterator[tuple[np.dtype[Any], int, int]],
 ) -> list[tuple[np.dtype[Any], int, int]]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80._core as _core
-from o80.rows.actuators import Number, actuators_of
+from o80.rows.actuators import Number, actuators_of, blending
 from o80.rows.columns import columns_of
 from o80.rows.history import History
 from o80.rows.journal import JournalCommand, JournalEntry
@@ -184,10 +184,7 @@ def planned_by_chunks(
     columns = {each.name for each in columns_of(history.schema)}
     oldest, newest = int(history.iteration[0]), int(history.iteration[-1])
     # states that interpolate by themselves have no known plan
-    types = [each["type"] for each in history.schema["groups"]]
-    blending = {
-        each["name"] for each in history.schema["actuators"] if "blends" in types[each["group"]]
-    }
+    blends = blending(history.schema)
     number_of: dict[str, Number] = {}
     for each in actuators_of(history.schema):
         number_of.update(zip(each.paths, each.numbers, strict=True))
@@ -201,7 +198,7 @@ def planned_by_chunks(
             continue
         # numbers that switch have no start: their rows are held
         of_it = entry.starts or {}
-        given = [each for each in _numbers(command, blending) if f"desired.{each[0]}" in columns]
+        given = [each for each in _numbers(command, blends) if f"desired.{each[0]}" in columns]
         if not given:
             continue
         starts = [of_it.get(name, (0.0, 0.0, 0.0)) for name, _ in given]
@@ -226,11 +223,11 @@ def planned_by_chunks(
 
 
 def _numbers(
-    command: JournalCommand, blending: set[str]
+    command: JournalCommand, blends: list[str]
 ) -> Iterable[tuple[str, NDArray[np.generic]]]:
     """Yields each number with its rows (rows,) in a command, except for blending actuators."""
     for actuator, target in zip(command.actuators, command.targets, strict=True):
-        if actuator in blending:
+        if actuator in blends:
             continue
         fields = target if isinstance(target, dict) else {"": target}
         for field, values in fields.items():

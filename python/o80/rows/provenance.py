@@ -63,22 +63,16 @@ class Provenance:
         found = json.loads(text)
         known = {field.name for field in fields(cls)}
         provenance = cls.from_fields({name: found[name] for name in found if name in known})
-        if not all(isinstance(each, dict) for each in (provenance.options, provenance.run_options)):
+        pairs = (provenance.options, provenance.run_options, *map(vars, provenance.files))
+        if not all(isinstance(each, dict) for each in pairs):
             raise TypeError("options are not a mapping")
-        texts = [
-            *(getattr(provenance, name) for name in _TEXTS),
-            *(
-                text
-                for pairs in (provenance.options, provenance.run_options)
-                for text in (*pairs.keys(), *pairs.values())
-            ),
-            *(text for file in provenance.files for text in vars(file).values()),
-        ]
-        if not all(isinstance(text, str) for text in texts):
+        texts = [getattr(provenance, name) for name in _TEXTS]
+        texts += [text for each in pairs for pair in each.items() for text in pair]
+        numbers = provenance.wall_clock_offset, provenance.motion_rules
+        if not all(isinstance(each, str) for each in texts):
             raise ValueError("a value is not a text")
-        for number in (provenance.wall_clock_offset, provenance.motion_rules):
-            if not isinstance(number, int):
-                raise ValueError("a value is not a whole number")
+        if not all(isinstance(each, int) for each in numbers):
+            raise ValueError("a value is not a whole number")
         if not 0 <= provenance.motion_rules < 2**31:
             raise ValueError("the version of the motion rules is out of range")
         return provenance

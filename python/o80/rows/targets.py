@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 import o80._core as _core
 from o80.base.errors import InvalidArgument
 from o80.rows.enumerations import numbers_of
-from o80.rows.layout import Layout, dtype_of_type, labels_of_type, runs_of
+from o80.rows.layout import Layout, count_of, dtype_of_type, labels_of_type
 
 #: Rows of targets: an array, or a mapping from fields, groups, actuators or paths to arrays.
 Rows: TypeAlias = "ArrayLike | Mapping[str, Any]"
@@ -73,7 +73,7 @@ class _Parts:
         """Sets a field of these actuators (None: the first field) from (T, actuators), or (T,)."""
         if field is None and len({self._kinds[place] for place in places}) == 1:
             kind, labels = self._kinds[places[0]], labels_of_type(self._types[places[0]])
-            if _numbers_in(kind) > 1:
+            if count_of(kind) > 1:
                 with suppress(InvalidArgument):  # states in tuples; else numbers of the first field
                     values = states_from(numbers_of(labels, values), kind)
         array = np.asarray(values)
@@ -159,7 +159,7 @@ def states_from(targets: ArrayLike, kind: np.dtype[Any]) -> NDArray[Any]:
         array = np.asarray(targets, kind)
     except (TypeError, ValueError) as error:
         raise InvalidArgument(f"the targets cannot be read as {kind}: {error}") from error
-    if kind.names is not None and _numbers_in(kind) > 1:
+    if kind.names is not None and count_of(kind) > 1:
         try:
             given = np.asarray(targets)
         except ValueError:  # of mixed lengths: states in tuples
@@ -172,10 +172,6 @@ def states_from(targets: ArrayLike, kind: np.dtype[Any]) -> NDArray[Any]:
     return array
 
 
-def _numbers_in(kind: np.dtype[Any]) -> int:
-    return sum(count for _, _, count in runs_of(kind, 0))
-
-
 def _mask_of(given: Sequence[str], kind: np.dtype[Any]) -> list[int]:
     """Returns a bit for each given number of a state, in words of 64; empty: all are given."""
     if set(given) == set(kind.names or ()):
@@ -183,7 +179,7 @@ def _mask_of(given: Sequence[str], kind: np.dtype[Any]) -> list[int]:
     assert kind.fields is not None
     bits, place = 0, 0
     for name in kind.names or ():
-        count = _numbers_in(kind.fields[name][0])
+        count = count_of(kind.fields[name][0])
         if name in given:
             bits |= (1 << count) - 1 << place
         place += count
@@ -198,7 +194,7 @@ def _words_of(masks: list[list[int]], kinds: list[np.dtype[Any]]) -> list[int]:
     """Joins the words of all states; no words if all numbers are given."""
     if not any(masks):
         return []
-    numbers = [_numbers_in(kind) for kind in kinds]
+    numbers = [count_of(kind) for kind in kinds]
     words = (mask or _words((1 << n) - 1, n) for mask, n in zip(masks, numbers, strict=True))
     return [word for each in words for word in each]
 

@@ -123,11 +123,15 @@ def test_joints_with_actuators_are_the_actuators_of_the_robot() -> None:
         model=TWO_JOINTS, mode="actuated", limits="2.5 20 1000 0.4, elbow=2 15"
     ) as arm:
         shoulder, elbow = arm.actuators
-        assert (shoulder.name, shoulder.group, shoulder.unit) == ("shoulder", "joints", "rad")
+        assert (shoulder.name, shoulder.group, shoulder.numbers[0].unit) == (
+            "shoulder",
+            "joints",
+            "rad",
+        )
         assert shoulder.limits == o80.Limits(
             minimum=-np.pi, maximum=np.pi, speed=2.5, acceleration=20, jerk=1000, error=0.4
         )
-        assert (elbow.speed, elbow.limits.acceleration, elbow.limits.jerk) == (2, 15, 1000)
+        assert (elbow.limits.speed, elbow.limits.acceleration, elbow.limits.jerk) == (2, 15, 1000)
         arm.add_command(None, [0.8, -0.5], duration=1)
         row = arm.pulse_and_wait()
         np.testing.assert_allclose(row.desired.joints, [0.8, -0.5])
@@ -160,7 +164,7 @@ def test_an_actuator_says_what_its_joint_takes(
     with SIMULATION.inline(model=model, mode="actuated") as arm:
         (one,) = arm.actuators
         assert (one.name, one.group, [each.unit for each in one.numbers]) == ("x", group, units)
-        assert (one.minimum, one.maximum) == pytest.approx(bounds)
+        assert one.limits.numbers()[:2] == pytest.approx(bounds)
         for number in one.numbers[:-1]:
             assert number.rest == 0
         arm.add_command("x", 0.4, duration=0.2)
@@ -226,14 +230,14 @@ def test_a_urdf_file_has_the_limits_that_are_not_given(
 ) -> None:
     with urdf_arm(tmp_path, limits=limits) as arm:
         shoulder, elbow, wrist = arm.actuators
-        assert [shoulder.speed, elbow.speed] == speeds
-        assert (shoulder.minimum, shoulder.maximum) == (-1.5, 2)
-        assert (wrist.minimum, wrist.maximum) == (-2, 3)  # a velocity, by its drive and the file
+        assert [shoulder.limits.speed, elbow.limits.speed] == speeds
+        assert shoulder.limits.numbers()[:2] == (-1.5, 2)
+        assert wrist.limits.numbers()[:2] == (-2, 3)  # a velocity, by its drive and the file
 
 
 def test_a_joint_of_urdf_keeps_its_limits_under_another_name(tmp_path: Path) -> None:
     with urdf_arm(tmp_path, joints="first=shoulder") as arm:
-        assert [(each.name, each.speed) for each in arm.actuators] == [("first", 2.5)]
+        assert [(each.name, each.limits.speed) for each in arm.actuators] == [("first", 2.5)]
 
 
 @pytest.mark.parametrize("velocity", ["fast", "-1", "1 2"])
@@ -462,8 +466,8 @@ class Script:
             self._arm.burst(self._random.randrange(1, 40))
 
     def target(self, index: int) -> float:
-        actuator = self._arm.actuators[index]
-        return self._random.uniform(actuator.minimum, actuator.maximum)
+        limits = self._arm.actuators[index].limits
+        return self._random.uniform(limits.minimum, limits.maximum)
 
     def pace(self, index: int) -> dict[str, Any]:
         paces: list[dict[str, Any]] = [

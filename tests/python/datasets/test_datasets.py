@@ -176,17 +176,23 @@ def test_an_episode_with_a_gap_is_left_out_and_said(segment: str, path: Path) ->
 def test_episodes_of_restarted_robots_are_those_of_their_run(segment: str, path: Path) -> None:
     with o80.Recording(path, segment) as recording:
         rows = 0
-        for run, count in enumerate((10, 20)):
-            with o80.robots.load("two_joints").inline(segment) as arm:
+        for run, (count, frequency) in enumerate(((10, 1000), (20, 1000), (20, 500))):
+            with o80.robots.load("two_joints").inline(segment, frequency=frequency) as arm:
                 rows += count + 1
                 while recording._recorder.newest[segment] != 0 or not recording.rows:
                     recording.flush()
+                recording.mark("episode_end", reward=1.0)  # of no episode of this run
                 recording.mark("episode", run=run)
                 arm.burst(count)
                 while recording.rows < rows:
                     recording.flush()
-    found = episodes(path)
-    assert [(each.values["run"], len(each)) for each in found.all] == [(0, 10), (1, 20)]
+                if run == 1:
+                    recording.mark("episode_end", reward=2.0)
+    one, other = (found := episodes(path)).all
+    assert (one.values["run"], len(one), one.terminated, one.rewards.sum()) == (0, 10, False, 0)
+    assert (other.values["run"], len(other), other.rewards.sum()) == (1, 20, 2)
+    assert "another frequency" in found.left_out[0]
+    assert [len(each) for each in episodes(path, every=0.01).all] == [1, 2, 4]
 
 
 def test_a_recording_without_episodes_is_refused(arm: o80.Frontend, path: Path) -> None:

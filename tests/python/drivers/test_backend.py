@@ -63,10 +63,9 @@ def test_limits_idle_and_units_reach_the_frontend(segment: str) -> None:
         with o80.Frontend(segment) as frontend:
             first, _, hand = frontend.actuators
             assert [number.name for number in first.numbers] == ["position", "torque"]
-            assert (first.unit, hand.unit) == ("rad", "m")
-            assert first.numbers[1].minimum == -5.0
-            assert first.numbers[1].maximum == np.inf
-            assert (hand.minimum, hand.maximum, hand.speed) == (0.0, 1.0, 2.0)
+            assert (first.numbers[0].unit, hand.numbers[0].unit) == ("rad", "m")
+            assert first.numbers[1].limits == o80.Limits(minimum=-5.0)
+            assert hand.limits == o80.Limits(minimum=0.0, maximum=1.0, speed=2.0)
             assert hand.when_idle == "follow"
             assert first.when_idle == "hold"
             assert first.name == "joints_0"

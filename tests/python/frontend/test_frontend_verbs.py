@@ -131,7 +131,7 @@ def test_it_knows_its_robot(arm: o80.Frontend, segment: str) -> None:
     assert arm.segment == segment
     assert [actuator.name for actuator in arm.actuators] == ["shoulder", "elbow"]
     assert arm.actuators[1].index == 1
-    assert (arm.actuators[1].minimum, arm.actuators[1].maximum) == (-3.0, 3.0)
+    assert arm.actuators[1].limits.numbers()[:2] == (-3.0, 3.0)
     assert arm.actuators[0].when_idle == "hold"
     assert list(arm.requests) == ["reset", "snapshot", "restore", "home"]
     assert arm.frequency == pytest.approx(1000.0)

@@ -79,7 +79,7 @@ def test_at_another_speed_rows_are_exactly_as_recorded(
 ) -> None:
     recorded = rows_of(real_time, segment)
     begin = time.monotonic()
-    with o80.play(real_time, speed=speed, hold=True) as playback:
+    with o80.play(real_time, speed=speed, end=math.inf, hold=True) as playback:
         assert playback.wait(WAIT)
         taken = time.monotonic() - begin
         with o80.Frontend(segment) as arm:
@@ -155,7 +155,6 @@ def test_a_living_robot_keeps_its_name(recorded: Path, segment: str) -> None:
         ({"begin": -1.0}, "begin must be a number of seconds from 0"),
         ({"begin": 2.0, "end": 1.0}, "end must be later than begin"),
         ({"history": 0}, "history"),
-        ({"segments": "aram"}, "no segment 'aram'"),
     ],
 )
 def test_mistakes_are_named(recorded: Path, arguments: dict[str, Any], message: str) -> None:
@@ -163,20 +162,16 @@ def test_mistakes_are_named(recorded: Path, arguments: dict[str, Any], message: 
         o80.play(recorded, **arguments)
 
 
-def decisions(journal: list[o80.JournalEntry]) -> list[str]:
-    return [str(entry) for entry in journal]
-
-
 def test_the_journal_is_played(recorded: Path, segment: str) -> None:
     expected = o80.open(recorded)[segment].epochs[0].journal()
     with o80.play(recorded, bursts=True), o80.Frontend(segment, WAIT) as arm:
         arm.burst(10)
         so_far = arm.journal()
-        assert decisions(so_far) == decisions(expected)[: len(so_far)]
+        assert repr(so_far) == repr(expected[: len(so_far)])
         assert all(entry.iteration <= 10 for entry in so_far)
         assert any(entry.commands for entry in so_far)
         arm.burst(190)
-        assert decisions(arm.journal()) == decisions(expected)[: len(arm.journal())]
+        assert repr(arm.journal()) == repr(expected[: len(arm.journal())])
         assert any(entry.status is o80.Status.COMPLETED for entry in arm.journal())
 
 

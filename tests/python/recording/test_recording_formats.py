@@ -19,7 +19,6 @@ from o80.base.words import ProfileWord
 from o80.recording.journal_channel import Entries
 from o80.recording.reader import files_of
 from o80.recording.recorder import Recorder
-from o80.replaying.entry_feed import MotionRules
 from o80.rows.columns import columns_of
 
 RECORDINGS = Path(__file__).resolve().parents[2] / "data" / "recordings"
@@ -244,20 +243,31 @@ def test_a_recording_says_under_which_motion_rules_it_was_made(segment: str, pat
 
 
 @pytest.mark.parametrize("other", [_core.MOTION_RULES - 1, _core.MOTION_RULES + 1])
+@pytest.mark.parametrize(
+    ("profile", "name", "row"), [("linear", "lift", 11), ("minimum_jerk", "free", 1)]
+)
 def test_under_other_rules_rows_are_compared_up_to_the_first_command_that_they_change(
-    other: int, segment: str, path: Path, forged: dict[str, Any]
+    profile: ProfileWord,
+    name: str,
+    row: int,
+    other: int,
+    segment: str,
+    path: Path,
+    forged: dict[str, Any],
 ) -> None:
     forged["motion_rules"] = other
-    record_limited(path, segment)
+    record_limited(path, segment, profile)
     (run,) = o80.replay(path)
 
     assert run.difference is None
     assert not run.identical
-    assert run.rows == 11  # up to row 10
+    assert run.rows == row
     now = _core.MOTION_RULES
-    assert f"command of lift, which motion rules {now} may move otherwise" in run.gap
+    assert f"command of {name}, which motion rules {now} may move otherwise" in run.gap
     said = told("replay", path, code=2)
-    assert "states identical up to row 10; then row 11 begins a command of lift" in said
+    assert (
+        f"states identical up to row {row - 1}; then row {row} begins a command of {name}" in said
+    )
     assert f"note: it moved by motion rules {other}, this o80 has motion rules {now}" in said
 
 
@@ -270,15 +280,3 @@ def test_rules_that_change_no_command_of_the_run_are_noted(
 
     assert run.identical, run
     assert any("it moved by motion rules 77" in note for note in run.notes)
-
-
-def test_the_first_command_is_found_whatever_the_rules_are(segment: str, tmp_path: Path) -> None:
-    profiles: list[tuple[ProfileWord, list[int]]] = [("linear", [11]), ("minimum_jerk", [1, 11])]
-    for profile, changed in profiles:
-        path = record_limited(tmp_path / f"{profile}.mcap", segment, profile)
-        (epoch,) = o80.open(path)[segment].epochs
-        entries = list(epoch.native_journal())
-        for recorded, now in ((1, 1), (2, 2), (1, 2), (3, 2)):
-            rules = MotionRules.of(epoch.schema, recorded, now)
-            moved = [entry.iteration for entry in entries if rules.moved_otherwise(entry)]
-            assert moved == (changed if recorded != now else []), (profile, recorded, now)

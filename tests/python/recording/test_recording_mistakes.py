@@ -240,10 +240,6 @@ def test_a_sensor_without_actuators_is_recorded_plotted_and_exported(
     assert np.load(tmp_path / "run.npz")[f"{segment}/extended.force"].tolist() == [1.5]
 
 
-def test_very_many_seconds_are_all_rows(segment: str, recorded: Path) -> None:
-    assert len(o80.open(recorded)[segment].history(seconds=1e300)) == 201
-
-
 def test_a_tolerance_is_a_number_from_0_on() -> None:
     for tolerance in ("observed", "observed=x", "observed=-1", "observed=nan"):
         with pytest.raises(typer.BadParameter, match="a number of at least 0"):

@@ -35,7 +35,7 @@ def day(segment: str, tmp_path: Path) -> Path:
             for robot in (arm, other):
                 robot.burst(500)
             recording.flush()
-        recording.close()
+    recording.close()
     return path
 
 
@@ -75,13 +75,19 @@ def test_a_stretch_of_time_is_cut_and_replayed(day: Path, segment: str, tmp_path
     assert topics.count(topic_of(segment)) == topics.count(topic_of(segment, "joint_states"))
 
 
-def test_segments_are_chosen_and_rows_are_thinned(day: Path, segment: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("every", "ranges"), [(7, [(1, 2996), (2997, 3000)]), (5000, [(1, 3000)])])
+def test_segments_are_chosen_and_rows_are_thinned(
+    day: Path, segment: str, tmp_path: Path, every: int, ranges: list[tuple[int, int]]
+) -> None:
     part = tmp_path / "part.mcap"
-    cut(day, part, segment=[segment], every=10)
+    cut(day, part, segment=[segment], every=every)
     read = o80.open(part)
     assert [*read] == [segment]
-    assert read[segment].history().iteration.tolist() == [*range(0, 3001, 10)]
-    assert len(read[segment].epochs[0].journal()) == len(o80.open(day)[segment].epochs[0].journal())
+    (epoch,) = read[segment].epochs
+    assert epoch.history().iteration.tolist() == [*range(0, 3001, every)]
+    assert epoch.gaps == [Gap(*each, f"every {every}th row was kept") for each in ranges]
+    assert epoch.missing == 3001 - epoch.rows
+    assert len(epoch.journal()) == len(o80.open(day)[segment].epochs[0].journal())
     report = o80.replay(part)
     assert not report.identical
     assert "missing" in str(report)

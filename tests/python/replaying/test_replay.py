@@ -268,7 +268,6 @@ def test_what_another_build_recorded_is_compared_with_a_tolerance(run_in_file: F
 def test_another_machine_is_noted(run_in_file: FileRun) -> None:
     machine = run_in_file.machine
     assert machine == this_machine()
-    assert machine is not None
     older = replace(machine, libc="glibc 2.1")
     assert "glibc 2.1 recorded it" in older.difference(machine)
     lesser = replace(machine, features=machine.features[1:])

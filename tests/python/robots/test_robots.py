@@ -111,7 +111,7 @@ def test_options_and_flags_reach_the_robot(segment: str) -> None:
     ) as process:
         with process.frontend() as arm:
             assert arm.bursting
-            assert arm.actuators[0].maximum == 1.5
+            assert arm.actuators[0].limits.maximum == 1.5
             arm.add_command(0, 1.0)
             assert arm.burst(100, timeout=WAIT).observed[0] < 1e-6
             assert len(arm.history()) == 64

@@ -22,8 +22,8 @@ class PressureRange:
     @classmethod
     def of(cls, frontend: o80.Frontend) -> PressureRange:
         """Reads the limits of an arm's actuators."""
-        muscles = frontend.actuators
-        return cls([m.minimum for m in muscles], [m.maximum for m in muscles])
+        limits = [each.limits for each in frontend.actuators]
+        return cls([each.minimum for each in limits], [each.maximum for each in limits])
 
     @property
     def most(self) -> FloatArray:
