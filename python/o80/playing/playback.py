@@ -273,9 +273,8 @@ def _check(speed: float, begin: float, end: float | None, history: int | None) -
         raise InvalidArgument(f"begin must be a number of seconds from 0, got {begin:g}")
     if end is not None and not end > begin:
         raise InvalidArgument(f"end must be later than begin ({begin:g} s), got {end:g} s")
-    if history is not None:
-        if whole(history, "history", 1) >= 2**63:
-            raise InvalidArgument(f"history must be less than 2^63 rows, got {history}")
+    if history is not None and whole(history, "history", 1) >= 2**63:
+        raise InvalidArgument(f"history must be less than 2^63 rows, got {history}")
 
 
 play = Playback

@@ -336,10 +336,8 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
     "missing": lambda _: None,
     "a folder": Path.mkdir,
     "empty": holds(b""),
-    "zeros": holds(b"\0" * 100),
     "words": holds(b"not what was expected\n"),
     "a huge number": holds(b"9" * 100_000),
-    "negative": holds(b"-1 -1 -1 -1\n"),
     "numbers": holds(b"1 2 3 4 5 6 7 8 9 10\n" * 50),
     "endless lists": holds(b"0-99999999,5\n" * 50),
     "braces": holds(b"{0} {name} {} ((((( :: ,,, --- %s %d\n" * 50),
@@ -373,7 +371,7 @@ def test_no_damage_of_all_files_makes_the_doctor_fail(tmp_path: Path, kind: str)
     report = RecordedComputer(tmp_path, "").examine(1000)
 
     assert json.dumps(report.as_dict())
-    if kind in ("missing", "a folder", "empty", "zeros"):
+    if kind in ("missing", "a folder", "empty"):
         assert set(report.unread) >= NEEDED
         assert "as far as could be read" in report.verdict or report.culprits
 
