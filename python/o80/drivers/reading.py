@@ -72,8 +72,10 @@ class Desired:
                 f"rate() and rate2() need one field of a state: {', '.join(view.dtype.names)}"
             )
         first = view.__array_interface__["data"][0] - self._block.__array_interface__["data"][0]
-        strides = np.array(view.strides, np.intp)
-        places = first + np.tensordot(strides, np.indices(view.shape), 1)
+        places = np.full(view.shape, first)
+        for axis, stride in enumerate(view.strides):
+            along = stride * np.arange(view.shape[axis])
+            places += along.reshape([-1 if i == axis else 1 for i in range(view.ndim)])
         found = self.differences(places.ravel().tolist(), order)
         return np.array(found).reshape(view.shape)
 
