@@ -231,6 +231,7 @@ def _share(schema: dict[str, Any], offset: int) -> tuple[float, float] | None:
     for actuator in schema["actuators"]:
         fields = schema["groups"][actuator["group"]]["type"]["fields"]
         low, high = actuator["limits"][0]["minimum"], actuator["limits"][0]["maximum"]
-        if actuator["offset"] == offset and fields[0]["unit"] == "1" and None not in (low, high):
+        is_share = actuator["offset"] == offset and fields[0]["unit"] == "1"
+        if is_share and None not in (low, high) and low < high:
             return low, high
     return None

@@ -79,7 +79,6 @@ def test_a_field_of_a_larger_state_has_the_path_that_other_commands_take(segment
         ("observed.elbw", "no number 'observed.elbw'. Did you mean 'observed.elbow'?"),
         ("extended.geer", "no number 'extended.geer'. Did you mean 'extended.gear'?"),
         ("observed.elbow.x", "no number 'observed.elbow.x'. Did you mean 'observed.elbow'?"),
-        ("active.elbw", "a row has no number 'active.elbw'"),
     ],
 )
 def test_a_field_that_is_not_there_is_answered_with_the_nearest(
