@@ -3,7 +3,6 @@
 import json
 import os
 import sys
-import time
 from collections.abc import Iterator
 from enum import IntEnum
 
@@ -101,12 +100,10 @@ def test_odd_numbers_are_refused(words: str, said: str) -> None:
 
 
 def test_a_missing_segment_is_said_at_once(segment: str) -> None:
-    begin = time.monotonic()
     said = echo(segment, fails=True)
     assert "no segment has that name" in said
     assert "within the time given" not in said, "it waited"
     assert "--wait" in said
-    assert time.monotonic() - begin < WAIT
 
 
 def test_it_waits_for_a_robot_if_told_so(segment: str) -> None:

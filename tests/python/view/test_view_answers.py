@@ -19,8 +19,10 @@ from o80.recording.joint_states import joints_of
 from o80.view import foreign_model
 from o80.view.answers import Answers
 from o80.view.curves import STRETCHES, drawn_rows
+from o80.view.scene import Scene
 from o80.view.source_list import SourceList
 from o80.view.urdf import Links
+from o80.view.world import Drawn, Standing
 
 Look = Callable[..., dict[str, Any]]
 Floats = NDArray[np.float64]
@@ -270,6 +272,12 @@ def test_a_backend_in_python_names_a_model_and_what_moves_it(segment: str, tmp_p
             pose = pose_of(looks_at(segment)())
         assert pose[0, 3:] == pytest.approx(turn_about_y(0.5), abs=1e-6)
         assert pose[1, 3:] == pytest.approx(turn_about_y(-0.25), abs=1e-6)
+
+
+def test_a_place_for_a_body_that_does_not_float_is_left_out(arm: o80.Frontend) -> None:
+    place = {"what": "position", "name": "lower", "from": "states", "offset": 0}
+    what = Drawn(arm.model, {"file": "", "values": [place]}, True, Standing())
+    assert Scene(arm.schema, what).poses(arm.latest())["pose"]
 
 
 MODEL = "<mujoco><worldbody>{}</worldbody></mujoco>"
