@@ -107,6 +107,6 @@ def _time(text: str, first: int, last: int, option: str) -> int:
     except ValueError:
         instant = local_time.instant(text, within=(first, last), is_end=option == "--to")
         return local_time.nanoseconds(instant)
-    if not math.isfinite(seconds):
+    if not math.isfinite(seconds * 1e9):
         raise InvalidArgument(f"{option}: write {_TIME}, not '{text}'")
     return first + round(seconds * 1e9)

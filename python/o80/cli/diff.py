@@ -13,7 +13,16 @@ from o80.rows.history import History
 GAPS = 10  # gaps that are listed for each run
 
 
-def _tolerances(texts: list[str] | None) -> dict[str, float]:
+Ignore = Annotated[
+    str, typer.Option(help="Columns to leave out, for example extended,observed.elbow")
+]
+Tolerance = Annotated[
+    list[str] | None,
+    typer.Option(help="FIELD=NUMBER: differences up to this number count as equal."),
+]
+
+
+def tolerances_of(texts: list[str] | None) -> dict[str, float]:
     found = {}
     for text in texts or []:
         field, _, number = text.partition("=")
@@ -34,13 +43,8 @@ def diff(
     one: Annotated[str, typer.Argument(help="A recording (.mcap), or a segment.")],
     other: Annotated[str, typer.Argument(help="Another one.")],
     segment: Annotated[str | None, typer.Option(help="Compare only this segment.")] = None,
-    ignore: Annotated[
-        str, typer.Option(help="Columns to leave out, for example extended,observed.elbow")
-    ] = "",
-    tolerance: Annotated[
-        list[str] | None,
-        typer.Option(help="FIELD=NUMBER: differences up to this number count as equal."),
-    ] = None,
+    ignore: Ignore = "",
+    tolerance: Tolerance = None,
 ) -> None:
     """Compare two recordings row by row, bit for bit.
 
@@ -51,7 +55,7 @@ def diff(
     """
     from o80.joining.difference import first_difference
 
-    tolerances = _tolerances(tolerance)
+    tolerances = tolerances_of(tolerance)
     left_out = [name for name in ignore.split(",") if name]
     pairs = _pairs(list(histories(one, segment)), list(histories(other, segment)))
     if not pairs:

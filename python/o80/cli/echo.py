@@ -146,9 +146,7 @@ class _Printer:
         self._fields = fields
         self._as_json = as_json
         if frontend.published >= 0:  # refuse an unknown field before anything is printed
-            plain = self._values.plain(frontend.latest())
-            for path in fields:
-                self._values.choose(plain, path)
+            self._chosen(frontend.latest())
 
     def print_head(self) -> None:
         """Prints the state of the loop on stderr, so that rows can be piped; not beside JSON."""
@@ -156,11 +154,16 @@ class _Printer:
             head = pace_text(_core.loop_state(self._frontend))
             print(f"{self._frontend.segment}: {head}", file=sys.stderr, flush=True)
 
-    def print(self, row: Observation) -> None:
+    def _chosen(self, row: Observation) -> dict[str, object]:
+        """Converts the chosen fields to plain values; all fields if none were chosen."""
         plain = self._values.plain(row)
-        if self._fields:
-            chosen = {path: self._values.choose(plain, path) for path in self._fields}
-            plain = {"iteration": plain["iteration"], "time": plain["time"]} | chosen
+        if not self._fields:
+            return plain
+        chosen = {path: self._values.choose(row, plain, path) for path in self._fields}
+        return {"iteration": row.iteration, "time": row.time} | chosen
+
+    def print(self, row: Observation) -> None:
+        plain = self._chosen(row)
         emit(json_text(plain, say=complain_once) if self._as_json else self._line(row, plain))
 
     def _line(self, row: Observation, plain: dict[str, object]) -> str:

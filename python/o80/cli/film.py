@@ -9,6 +9,7 @@ import numpy as np
 import typer
 
 from o80.base.errors import InvalidArgument
+from o80.cli.numbers import positive
 
 if TYPE_CHECKING:
     from o80.view.source import Source
@@ -26,7 +27,9 @@ def film(
     begin: Annotated[float, typer.Option("--from", help="Seconds after its first row.")] = 0.0,
     end: Annotated[float | None, typer.Option("--to", help="Likewise; default: the last.")] = None,
     speed: Annotated[float, typer.Option(help="0.5: half as fast as recorded.")] = 1.0,
-    rate: Annotated[float, typer.Option(min=1, max=120, help="Frames a second.")] = 25.0,
+    rate: Annotated[
+        float, typer.Option(min=1, max=120, callback=positive, help="Frames a second.")
+    ] = 25.0,
     size: Annotated[tuple[int, int], typer.Option(help="Pixels of each robot.")] = (480, 360),
     camera: Annotated[
         str | None, typer.Option(help="Camera of the models: a name, or -1 from outside.")

@@ -29,32 +29,27 @@ def follow(frontend: Frontend, count: int, as_json: bool, timeout: float | None)
     if not journal.exists:
         raise Error(f"'{frontend.segment}' has no journal: its backend was started without one")
     lines = _Lines(as_json)
+    left = count if count else None
     alive = frontend.alive
-    there = [(entry, lines.line(entry)) for entry in journal.read()]
-    shown = there[-(count or (_BEFORE if alive else len(there))) :] if there else []
-    for _, line in shown:
-        emit(line)
-    if not alive:
-        frontend.wait_for(frontend.published + 1, timeout=0)  # raises the reason of its end
-    printed = len(shown)
-    if count and printed >= count:
-        return
+    found = [lines.line(entry) for entry in journal.read()]
+    found = found[-(count or (_BEFORE if alive else 0)) :]
     waited_since = time.monotonic()
     while True:
-        alive = frontend.alive
-        entries = journal.read()
-        for entry in entries:
-            emit(lines.line(entry))
-            printed += 1
-            if count and printed >= count:
-                return
+        for line in found:
+            emit(line)
         if not alive:
-            frontend.wait_for(frontend.published + 1, timeout=0)
-        if entries:
+            frontend.wait_for(frontend.published + 1, timeout=0)  # raises the reason of its end
+        if left is not None:
+            left -= len(found)
+            if not left:
+                return
+        if found:
             waited_since = time.monotonic()
         elif timeout is not None and time.monotonic() - waited_since >= timeout:
             raise TimeoutError(f"'{frontend.segment}' decided nothing for {timeout:g} s")
         time.sleep(_LOOK)
+        alive = frontend.alive
+        found = [lines.line(entry) for entry in journal.read()][:left]
 
 
 def print_recorded(path: str, count: int, as_json: bool) -> None:

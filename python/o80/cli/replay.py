@@ -10,7 +10,7 @@ from o80.base.errors import Error
 from o80.base.screen import complain, overwrite, plain
 from o80.base.symptoms import see
 from o80.cli.attach import attach
-from o80.cli.diff import _tolerances
+from o80.cli.diff import Ignore, Tolerance, tolerances_of
 
 _ENOUGH = 1000  # rows for a speed that is not that of the start
 
@@ -50,13 +50,8 @@ def replay(
             "readings, as for hardware.",
         ),
     ] = False,
-    ignore: Annotated[
-        str, typer.Option(help="Columns to leave out, for example extended,observed.elbow")
-    ] = "",
-    tolerance: Annotated[
-        list[str] | None,
-        typer.Option(help="FIELD=NUMBER: differences up to this number count as equal."),
-    ] = None,
+    ignore: Ignore = "",
+    tolerance: Tolerance = None,
     exact: Annotated[
         bool, typer.Option("--exact", help="Bit for bit, also if another build of o80 recorded it.")
     ] = False,
@@ -79,7 +74,7 @@ def replay(
             since=since,
             driver=not without_driver,
             ignore=tuple(name for name in ignore.split(",") if name),
-            tolerances=_tolerances(tolerance) if tolerance or exact else None,
+            tolerances=tolerances_of(tolerance) if tolerance or exact else None,
             progress=_show if sys.stderr.isatty() else None,
         )
     except Error as error:  # 1 means that a row differs

@@ -30,16 +30,18 @@ def run(context: typer.Context) -> None:
             print(f"  {known.name:<16} {known.path}")
         raise typer.Exit(0 if arguments else 2)
     robot, flags = arguments[0], arguments[1:]
-    if (place := robots.place_of(robot)) is not None:
-        os.execv(sys.executable, [sys.executable, "-u", "-m", "o80.run_driver", place, *flags])
-    if (preset := robots.preset_of(robot)) is not None:
+    named = robot if robots.is_place(robot) else robots.found(robot)
+    if isinstance(named, type):
+        named = f"{named.__module__}:{named.__qualname__}"
+    if isinstance(named, str):
+        os.execv(sys.executable, [sys.executable, "-u", "-m", "o80.run_driver", named, *flags])
+    if isinstance(named, tuple):
         given = {flag.partition("=")[0] for flag in flags}
-        options = {"segment": robot, **preset[1]}
+        options = {"segment": robot, **named[1]()}
         flags += [f"--{key}={value}" for key, value in options.items() if f"--{key}" not in given]
-        robot = preset[0]
-    flags = _with_face(flags)
+        named = robots.path_of(named[0])
     program = Path(prefix()) / "bin" / "o80-run"
-    os.execv(program, [str(program), str(robots.path_of(robot)), *flags])
+    os.execv(program, [str(program), str(named), *_with_face(flags)])
 
 
 def _with_face(flags: list[str]) -> list[str]:

@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 
-import o80._core as _core
 from o80._core import Observation
-from o80.base.errors import InvalidArgument
+from o80.rows.columns import columns_at, labelled_value_of
 from o80.rows.enumerations import Enumeration
 from o80.rows.record import Record
 
@@ -57,36 +56,18 @@ class RowValues:
         rest = f" and {len(names) - 5} more" if len(names) > 5 else ""
         return ", ".join(names[:5]) + rest
 
-    def choose(self, plain: dict[str, Any], path: str) -> Any:
-        """Selects a value by its path: "observed.elbow", "extended.effort", "observed.position.0".
+    def choose(self, row: Observation, plain: dict[str, Any], path: str) -> Any:
+        """Selects a value: "halted", "active.elbow", or a path of numbers, as in `row[path]`.
 
-        Raises InvalidArgument for an unknown path.
+        plain: the row as plain values. Raises InvalidArgument for an unknown path.
         """
-        value: Any = plain
-        walked = ""
-        for step in path.split("."):
-            known = self._steps(value)
-            if step not in known:
-                where = f"'{walked}' has no value" if walked else "a row has no field"
-                if not known:
-                    raise InvalidArgument(f"--fields: {where} '{step}': it is a plain value")
-                names = [name for name in known if not name.isdecimal()] or list(known)
-                instead = _core.names_instead(step, names)
-                raise InvalidArgument(f"--fields: {where} '{step}'{instead}")
-            value = value[known[step]]
-            walked = f"{walked}.{step}" if walked else step
-        return value
-
-    def _steps(self, value: Any) -> dict[str, Any]:
-        """Returns possible next steps of a path: names of fields and actuators, or indices."""
-        if isinstance(value, dict):
-            return {name: name for name in value}
-        if not isinstance(value, list):
-            return {}
-        indices = {str(i): i for i in range(len(value))}
-        named = len(value) == len(self._actuators)
-        names = {name: i for i, name in enumerate(self._actuators)} if named else {}
-        return names | indices
+        if path in plain:
+            return plain[path]
+        part, _, actuator = path.partition(".")
+        if actuator in self._actuators and isinstance(plain.get(part), list):
+            return plain[part][self._actuators.index(actuator)]
+        values = [labelled_value_of(row, column) for column in columns_at(self._schema, path)]
+        return values[0] if len(values) == 1 else values
 
 
 def _plain(value: Any) -> Any:

@@ -4,6 +4,7 @@ import dataclasses
 import typing
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
+from pathlib import Path
 from typing import Any, Literal, NewType, get_args, get_origin
 
 import o80._core as _core
@@ -112,27 +113,13 @@ def kind_of(annotation: Any, default: Any, name: str) -> Kind:
 
 
 def _simple_kind(annotation: Any) -> Kind | None:
-    from pathlib import Path
-
-    if annotation is Seed:
-        return Kind(SEED_KIND, _seed)
-    if annotation is bool:
-        return Kind("boolean", _one_of(TRUTH), lambda value: "true" if value else "false")
-    if annotation is int:
-        return Kind("integer", int)
-    if annotation is float:
-        return Kind("number", float, lambda value: repr(float(value)))
-    if annotation is str:
-        return Kind("text", str)
-    if annotation is Path:
-        return Kind("text", Path)
     if isinstance(annotation, type) and issubclass(annotation, Enum):
         labels = ", ".join(annotation.__members__)
         return Kind(f"one of: {labels}", _one_of(annotation.__members__), lambda v: v.name)
     if get_origin(annotation) is Literal and all(isinstance(w, str) for w in get_args(annotation)):
         words = get_args(annotation)
         return Kind(f"one of: {', '.join(words)}", _one_of({word: word for word in words}))
-    return None
+    return _SIMPLE.get(annotation)
 
 
 def _several(element: Kind, count: int, make: Any) -> Kind:
@@ -163,6 +150,16 @@ def _one_of(known: Mapping[str, Any]) -> Callable[[str], Any]:
         return known[text]
 
     return parse
+
+
+_SIMPLE = {
+    Seed: Kind(SEED_KIND, _seed),
+    bool: Kind("boolean", _one_of(TRUTH), lambda value: "true" if value else "false"),
+    int: Kind("integer", int),
+    float: Kind("number", float, lambda value: repr(float(value))),
+    str: Kind("text", str),
+    Path: Kind("text", Path),
+}
 
 
 def _with_article(kind: str) -> str:

@@ -34,7 +34,8 @@ class BurstArrays:
         delay: int,
     ) -> None:
         """copies: (number of copies,); () for a single robot."""
-        count, steps = _checked(iterations, "iterations"), _checked(steps, "steps")
+        count = whole(iterations, "iterations of a burst", 1)
+        steps = whole(steps, "steps of a burst", 1)
         states = _states(layout, copies, actuators, steps)
         states.view(np.uint8).fill(255)
         if states.ndim == 1:  # of several types: a field for each actuator
@@ -43,7 +44,7 @@ class BurstArrays:
             self._targets = states.swapaxes(-1, -2)
         self._rows: NDArray[Any] = np.zeros((*copies, count), layout.row)
         options = _core.CommandOptions(
-            iterations=_checked(each, "each"), mode=mode, profile=profile, start=start
+            iterations=whole(each, "each of a burst", 1), mode=mode, profile=profile, start=start
         )
         memory = states.view(np.uint8), self._rows.view(np.uint8)
         self._compiled = _core.PreparedBurst(actuators, steps, options, delay, count, *memory)
@@ -109,11 +110,6 @@ class PreparedBurst(BurstArrays):
         cannot follow, and the exceptions of `Frontend.burst`.
         """
         return self._run(self._frontend, timeout, at, late, seen)
-
-
-def _checked(count: int, name: str) -> int:
-    """Returns a count of at least 1. Raises InvalidArgument for others."""
-    return whole(count, f"{name} of a burst", 1)
 
 
 def _states(

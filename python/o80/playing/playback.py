@@ -73,7 +73,7 @@ class Playback(Closeable):
         first = min(one for one, _ in whole_range)
         last = max(two for _, two in whole_range)
         self._begin = first + round(begin * 1e9)
-        self._end = NEVER if end is None else first + round(min(end, 1e9) * 1e9)
+        self._end = NEVER if end is None else first + round(min(end * 1e9, NEVER))
         self.duration = max(0, min(last, self._end) - self._begin) * 1e-9  #: [s] at speed 1
         if self.duration == 0 and not any(
             begin <= self._end and end >= self._begin
@@ -260,12 +260,12 @@ def _tracks(path: str | os.PathLike[str], segments: str | Sequence[str] | None) 
 def _check(speed: float, begin: float, end: float | None, history: int | None) -> None:
     if not speed > 0:
         raise InvalidArgument(f"speed must be positive, got {speed:g}")
-    if not (begin >= 0 and math.isfinite(begin)):
+    if not (begin >= 0 and math.isfinite(begin * 1e9)):
         raise InvalidArgument(f"begin must be a number of seconds from 0, got {begin:g}")
     if end is not None and not end > begin:
         raise InvalidArgument(f"end must be later than begin ({begin:g} s), got {end:g} s")
-    if history is not None:
-        whole(history, "history", 1)
+    if history is not None and whole(history, "history", 1) >= 2**63:
+        raise InvalidArgument(f"history must be less than 2^63 rows, got {history}")
 
 
 play = Playback

@@ -54,12 +54,12 @@ def list() -> builtins.list[RobotFile]:
 
     A robot whose package fails, or needs a missing one, is left out: `load` raises the reason.
     """
-    found = {name: Path(path) for name, path in _core.find_robots()}
-    for name, point in announced(GROUP).items():
-        if name not in found:
+    robots = {name: Path(path) for name, path in _core.find_robots()}
+    for name in announced(GROUP):
+        if name not in robots:
             with suppress(DriverError):
-                found[name] = _path_of(point)
-    return [RobotFile(name, path) for name, path in found.items()]
+                robots[name] = path_of(name)
+    return [RobotFile(name, path) for name, path in robots.items()]
 
 
 def path_of(name_or_path: str | os.PathLike[str]) -> Path:
@@ -67,16 +67,29 @@ def path_of(name_or_path: str | os.PathLike[str]) -> Path:
 
     Raises DriverError for an unknown name, with the known robots in its text.
     """
+    robot = found(name_or_path)
+    if isinstance(robot, tuple):
+        return path_of(robot[0])
+    if isinstance(robot, type):
+        return Path(inspect.getsourcefile(robot) or robot.__module__)
+    return robot
+
+
+def found(name_or_path: str | os.PathLike[str]) -> "Path | type[Any] | tuple[str, Any]":
+    """Finds a robot: its library; a driver class; or, for a name that a package announces for a
+    robot with options, the robot and a function that returns the options.
+
+    Raises DriverError for an unknown name, with the known robots in its text.
+    """
     text = os.fspath(name_or_path)
     if os.sep in text or (text.endswith(".so") and Path(text).exists()):
         return Path(text).absolute()
-    found = dict(_core.find_robots())
-    if text in found:
-        return Path(found[text])
-    packaged = announced(GROUP)
+    bundled, packaged = dict(_core.find_robots()), announced(GROUP)
+    if text in bundled:
+        return Path(bundled[text])
     if text in packaged:
-        return _path_of(packaged[text])
-    raise DriverError(_core.no_such_robot(text, [*found, *packaged]))
+        return _value_of(packaged[text])
+    raise DriverError(_core.no_such_robot(text, [*bundled, *packaged]))
 
 
 def load(name_or_path: str | os.PathLike[str] | type[Any]) -> "Robot":
@@ -90,13 +103,14 @@ def load(name_or_path: str | os.PathLike[str] | type[Any]) -> "Robot":
     place = os.fspath(name_or_path)
     if is_place(place):
         return PythonRobot(place)
-    if (announced_class := _announced_class(place)) is not None:
-        return PythonRobot(announced_class)
-    if (preset := preset_of(place)) is not None:
-        robot = load(preset[0])
-        robot._announced, robot._given = place, preset[1]
+    of_name = found(place)
+    if isinstance(of_name, type):
+        return PythonRobot(of_name)
+    if isinstance(of_name, tuple):
+        robot = load(of_name[0])
+        robot._announced, robot._given = place, of_name[1]()
         return robot
-    return Robot(_core.load_robot(str(path_of(name_or_path))))
+    return Robot(_core.load_robot(str(of_name)))
 
 
 def face(of: Any) -> dict[str, Any]:
@@ -124,65 +138,27 @@ def is_place(text: str) -> bool:
     return bool(colon and where) and name.isidentifier()
 
 
-def place_of(robot: str) -> str | None:
-    """Returns the place of a robot's driver class in Python: "module:Class"; None for others."""
-    if is_place(robot):
-        return robot
-    driver = _announced_class(robot)
-    return None if driver is None else f"{driver.__module__}:{driver.__qualname__}"
-
-
-def preset_of(name: str) -> tuple[str, dict[str, Any]] | None:
-    """Returns robot and options that a package announces under a name; None for other names.
-
-    Raises DriverError with the reason if the options are not available here.
-    """
-    value = _announced(name)
-    return (value[0], value[1]()) if isinstance(value, tuple) else None
-
-
-def _announced_class(name: str) -> type[Any] | None:
-    """Returns the driver class that a Python package announces under a name, or None."""
-    value = _announced(name)
-    return value if isinstance(value, type) else None
-
-
-def _announced(name: str) -> Any:
-    """Returns the value of a robot's entry point; None without one, or for a bundled robot's name.
-
-    Raises DriverError if the package fails.
-    """
-    point = announced(GROUP).get(name)
-    return None if point is None or name in dict(_core.find_robots()) else _value_of(point)
-
-
-def _value_of(point: "EntryPoint") -> Any:
+def _value_of(point: "EntryPoint") -> "Path | type[Any] | tuple[str, Any]":
     """Loads an entry point: a driver class, a path, the name of a robot with a function that
     returns options for it, or a function that returns one of these.
     """
     package = point.dist.name if point.dist is not None else point.module
     try:
         value = point.load()
-        return value if isinstance(value, type) or not callable(value) else value()
+        value = value if isinstance(value, type) or not callable(value) else value()
     except Exception as error:
         raise DriverError(
             f"robot '{point.name}' cannot be loaded: the package {package}, which announces it, "
             f"failed with {sentence(exception_text(error))} Repair the package or uninstall it"
         ) from error
-
-
-def _path_of(point: "EntryPoint") -> Path:
-    path = _value_of(point)
-    if isinstance(path, tuple):
-        return path_of(path[0])
-    if isinstance(path, type):
-        return Path(inspect.getsourcefile(path) or path.__module__)
-    if not isinstance(path, (str, os.PathLike)):
-        raise DriverError(
-            f"entry point '{point.name}' of the group {GROUP} gives {path!r}: it must be a driver "
-            f"class, the path of a robot library, or a function that gives it"
-        )
-    return Path(path)
+    if isinstance(value, (str, os.PathLike)):
+        return Path(value)
+    if isinstance(value, (type, tuple)):
+        return value
+    raise DriverError(
+        f"entry point '{point.name}' of the group {GROUP} gives {value!r}: it must be a driver "
+        f"class, the path of a robot library, or a function that gives it"
+    )
 
 
 class Robot:

@@ -155,6 +155,13 @@ def value_of(row: Any, column: Column) -> Any:
     return np.ndarray((), column.dtype, row, column.offset)[()]
 
 
+def labelled_value_of(row: Any, column: Column) -> Any:
+    """Returns the number of a column in an observation, or the label if it has one."""
+    value = value_of(row, column).item()
+    labels = column.labels or {}
+    return next((label for label, number in labels.items() if number == value), value)
+
+
 def numbers_in(row: Any, layout: Layout, path: str) -> Any:
     """Returns numbers of an observation: one, or (n,). InvalidArgument for an unknown path."""
     values = [value_of(row, column) for column in layout.columns_at(path, columns_at)]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80._core import Observation
-from o80.rows.columns import Column, columns_of, value_of
+from o80.rows.columns import Column, columns_of, labelled_value_of
 from o80.rows.history import History, values_of
 from o80.rows.plans import Planned
 from o80.view.base64_arrays import packed
@@ -112,7 +112,7 @@ class Panels:
         """Returns a row's numbers by panel and part; numbers that JSON cannot hold are texts."""
         return {
             panel: {
-                part: _value(value_of(row, column), column)
+                part: _shown(labelled_value_of(row, column), column)
                 for part, column in self.columns[panel].items()
             }
             for panel in panels[:MAX_PANELS]
@@ -132,9 +132,6 @@ def drawn_rows(values: NDArray[np.float64]) -> NDArray[np.intp]:
     return np.unique(np.concatenate([starts, *extremes, ends]))
 
 
-def _value(value: Any, column: Column) -> float | str:
-    if column.labels is not None:
-        labels = {number: label for label, number in column.labels.items()}
-        return labels.get(int(value), str(int(value)))
-    number: float = value.item()
-    return number if math.isfinite(number) and abs(number) < EXACT else str(number)
+def _shown(value: Any, column: Column) -> float | str:
+    is_text = column.labels is not None or not math.isfinite(value) or abs(value) >= EXACT
+    return str(value) if is_text else value

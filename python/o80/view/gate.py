@@ -1,21 +1,18 @@
 """The connections of the server: which are accepted, and which are dropped.
 
-A halt must get through whatever else connects. So one thread, which never waits for a connection,
-reads the heads of all requests. A connection is a stranger until it has sent a head with the token.
-Then it is a holder, and a thread reads the body and sends the answer. Each kind has a budget of
-its own: too many strangers drop the oldest stranger, never a holder. Each round reads all holders,
-then accepts a few new connections, then reads a few strangers.
+A halt must get through whatever else connects. A connection is a stranger until it has sent a head
+with the token; then it is a holder. Each kind has a budget of its own: too many strangers drop the
+oldest stranger, never a holder. One thread, the loop of asyncio, reads them all: in each round all
+holders, a few new connections and a few strangers. A thread of its own computes each answer.
 """
 
+import asyncio
 import contextlib
 import errno
 import resource
 import select
-import selectors
 import socket
 import threading
-import time
-from collections import deque
 from collections.abc import Callable
 
 from o80.view.head import LARGEST_HEAD, LARGEST_REQUEST, Head, Refused, take_head
@@ -32,7 +29,7 @@ SENT_WITHIN = 30.0  # an answer [s]
 IDLE = 30.0  # until an unused connection of a holder is closed [s]
 REFUSED_AFTER = 1.0  # delay of a refusal, so that a client that retries costs little [s]
 CLOSED_AFTER = 2.0  # time after a refusal, if the client does not close the connection [s]
-TICK = 0.1  # [s]
+RETRIED_AFTER = 0.1  # until a connection is accepted again, without a free descriptor [s]
 
 CONTINUE = b"HTTP/1.1 100 Continue\r\n\r\n"
 NO_MORE = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
@@ -42,7 +39,7 @@ class Gate:
     """Serves the connections of one listening socket.
 
     refusal: returns why a request is refused, by its head; empty if it is not.
-    reply: answers a request with the token, in a thread.
+    reply: answers a request with the token, in a thread; raises nothing.
     """
 
     def __init__(
@@ -60,44 +57,34 @@ class Gate:
         self._most_strangers = min(MAX_STRANGERS, share)
         self._most_holders = min(MAX_HOLDERS, share)
         # the oldest first; a holder is as old as its last request
-        self._strangers: dict[_Connection, None] = {}
-        self._holders: dict[_Connection, None] = {}
-        self._answered: deque[_Connection] = deque()
-        self._closed = False
-        self._closing = threading.Lock()
-        self._wake, self._woken = socket.socketpair()
-        self._selector = selectors.DefaultSelector()
-        for watched in (listener, self._wake, self._woken):
-            watched.setblocking(False)
-        self._selector.register(listener, selectors.EVENT_READ)
-        self._selector.register(self._woken, selectors.EVENT_READ)
+        self._strangers: dict[int, _Stranger] = {}  # by descriptor
+        self._holders: dict[asyncio.Task[None], None] = {}
         self._ready_strangers = select.epoll()  # the kernel returns them in turn
-        self._selector.register(self._ready_strangers, selectors.EVENT_READ)
-        self._watched_strangers: dict[int, _Connection] = {}  # by descriptor
+        self._loop = asyncio.new_event_loop()
+        self._end = asyncio.Event()
 
     def serve(self) -> None:
         """Serves until another thread calls `close`."""
-        expired_at = 0.0
-        while not self._closed:
-            ready = [key for key, _ in self._selector.select(TICK)]
-            for key in ready:
-                if isinstance(key.data, _Connection):
-                    self._read(key.data)
-            self._take_back()
-            self._accept()
-            for descriptor, _ in self._ready_strangers.poll(0, READ_AT_ONCE):
-                if descriptor in self._watched_strangers:  # still watched
-                    self._read(self._watched_strangers[descriptor])
-            now = time.monotonic()
-            if now >= expired_at + TICK:
-                self._expire(now)
-                expired_at = now
-        self._end()
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:  # it ends all holders
+            runner.run(self._serve())
 
     def close(self) -> None:
         """Stops listening, and ends all connections. May be called twice."""
-        self._closed = True
-        self._notify()
+        with contextlib.suppress(RuntimeError):  # it has ended
+            self._loop.call_soon_threadsafe(self._end.set)
+
+    async def _serve(self) -> None:
+        self._listener.setblocking(False)
+        self._loop.add_reader(self._listener, self._accept)
+        self._loop.add_reader(self._ready_strangers, self._read_strangers)
+        await self._end.wait()
+        for watched in (self._listener, self._ready_strangers):
+            self._loop.remove_reader(watched)
+            watched.close()
+        for stranger in [*self._strangers.values()]:
+            self._drop(stranger)
+
+    # ------------------------------------------------------------------ strangers
 
     def _accept(self) -> None:
         for _ in range(ACCEPTED_AT_ONCE):
@@ -111,238 +98,190 @@ class Gate:
                 if self._strangers:  # the process has no descriptor left: frees one
                     self._drop_oldest()
                 else:
-                    time.sleep(TICK)
+                    self._loop.remove_reader(self._listener)
+                    retry = self._loop.add_reader
+                    self._loop.call_later(RETRIED_AFTER, retry, self._listener, self._accept)
                 return
-            connection = _Connection(accepted, time.monotonic() + HEAD_WITHIN)
-            self._strangers[connection] = None
-            self._read(connection)
-            self._make_room()
-
-    def _make_room(self) -> None:
-        while len(self._strangers) > self._most_strangers:
-            self._drop_oldest()
-
-    def _drop_oldest(self) -> None:
-        oldest = next(iter(self._strangers))
-        self._read(oldest)  # its token may have arrived meanwhile
-        if oldest in self._strangers:
-            self._drop(oldest)
-
-    def _expire(self, now: float) -> None:
-        for connection in [*self._strangers, *self._holders]:
-            if connection.until > now or connection.busy:
+            accepted.setblocking(False)
+            stranger = _Stranger(accepted)
+            stranger.next = self._loop.call_later(HEAD_WITHIN, self._drop, stranger)
+            self._strangers[accepted.fileno()] = stranger
+            try:
+                self._ready_strangers.register(accepted, select.EPOLLIN)
+            except OSError:  # the user's limit of watches is reached
+                self._drop(stranger)
                 continue
-            if connection.refusal:
-                self._send_refusal(connection, now)
-            else:
-                self._drop(connection)
+            self._read(stranger)
+            while len(self._strangers) > self._most_strangers:
+                self._drop_oldest()
 
-    def _read(self, connection: "_Connection") -> None:
-        if connection.busy or connection.closed:
-            return  # since the selector reported it
+    def _read_strangers(self) -> None:
+        for descriptor, _ in self._ready_strangers.poll(0, READ_AT_ONCE):
+            if descriptor in self._strangers:
+                self._read(self._strangers[descriptor])
+
+    def _read(self, stranger: "_Stranger") -> None:
+        """Serves or refuses a request as soon as its whole head was received."""
         try:
-            data = connection.socket.recv(LARGEST_HEAD)
+            data = stranger.socket.recv(LARGEST_HEAD)
         except BlockingIOError:
-            self._try_to_watch(connection)
             return
         except OSError:
             data = b""
-        if not data and connection in self._strangers and not connection.refused:
-            connection.refused = True  # closed later, like a connection that gets a reason
-            connection.until = time.monotonic() + REFUSED_AFTER
-            self._unwatch(connection)
-        elif not data:
-            self._drop(connection)
-        elif connection.refused:
-            connection.ignored += len(data)
-            if connection.ignored > LARGEST_REQUEST:
-                self._drop(connection)
-        else:
-            if connection in self._holders and not connection.received:
-                connection.until = time.monotonic() + HEAD_WITHIN
-            connection.received += data
-            self._take_request(connection)
-
-    def _take_request(self, connection: "_Connection") -> None:
-        """Serves or refuses a request as soon as its whole head was received."""
+        if not data:
+            self._close_later(stranger, None)  # like a connection that gets a reason
+            return
+        stranger.received += data
         try:
-            head = take_head(connection.received, connection.checked)
-            connection.checked = 0 if head else len(connection.received)
-            if head is None:
-                self._watch(connection)
-            elif why := self._refusal(head):
-                self._refuse(connection, Refused(403, f"refused: {why}"))
-            else:
-                self._begin(connection, head)
+            head = self._take_head(stranger.received, stranger.checked)
         except Refused as refused:
-            self._refuse(connection, refused)
-        except Exception:  # for example no thread: it costs this connection, not the others
-            self._drop(connection)
+            self._close_later(stranger, refused)
+            return
+        stranger.checked = len(stranger.received)
+        if head is not None:
+            self._forget(stranger)
+            self._hold(stranger.socket, stranger.received, head)
 
-    def _refuse(self, connection: "_Connection", refused: Refused) -> None:
-        connection.refused = True
-        connection.refusal = Reply(refused.code, f"{refused}\n".encode()).as_bytes(last=True)
-        connection.received.clear()
-        connection.until = time.monotonic() + REFUSED_AFTER
-        self._try_to_watch(connection)
+    def _take_head(self, received: bytearray, checked: int) -> Head | None:
+        """Removes a head; None while it is incomplete. Raises Refused, also without the token."""
+        head = take_head(received, checked)
+        if head is not None and (why := self._refusal(head)):
+            raise Refused(403, f"refused: {why}")
+        return head
 
-    def _send_refusal(self, connection: "_Connection", now: float) -> None:
-        """Sends the reason of a refusal. Closed later: unread bytes would lose the answer."""
-        try:
-            connection.socket.send(connection.refusal)
-            connection.socket.shutdown(socket.SHUT_WR)
-        except OSError:
-            self._drop(connection)
-        connection.refusal = b""
-        connection.until = now + CLOSED_AFTER
+    def _close_later(self, stranger: "_Stranger", refused: Refused | None) -> None:
+        self._unwatch(stranger)
+        stranger.next.cancel()
+        stranger.next = self._loop.create_task(_refuse(stranger.socket, refused))
+        stranger.next.add_done_callback(lambda _: self._drop(stranger))
 
-    def _begin(self, connection: "_Connection", head: Head) -> None:
-        self._strangers.pop(connection, None)
-        self._holders.pop(connection, None)
+    def _unwatch(self, stranger: "_Stranger") -> None:
+        with contextlib.suppress(OSError, ValueError):  # it is not watched, or the gate has ended
+            self._ready_strangers.unregister(stranger.socket)
+
+    def _forget(self, stranger: "_Stranger") -> None:
+        self._unwatch(stranger)
+        self._strangers.pop(stranger.socket.fileno(), None)
+        stranger.next.cancel()
+
+    def _drop(self, stranger: "_Stranger") -> None:
+        self._forget(stranger)
+        stranger.socket.close()
+
+    def _drop_oldest(self) -> None:
+        oldest = next(iter(self._strangers.values()))
+        if isinstance(oldest.next, asyncio.TimerHandle):  # it is not refused
+            self._read(oldest)  # its token may have arrived meanwhile
+        if self._strangers.get(oldest.socket.fileno()) is oldest:
+            self._drop(oldest)
+
+    # ------------------------------------------------------------------ holders
+
+    def _hold(self, connection: socket.socket, received: bytearray, head: Head) -> None:
         if len(self._holders) >= self._most_holders:
-            self._drop(next(iter(self._holders)))
-        self._holders[connection] = None
-        self._unwatch(connection)
-        threading.Thread(target=self._answer, args=(connection, head), daemon=True).start()
-        connection.busy = True
+            oldest = next(iter(self._holders))
+            del self._holders[oldest]
+            oldest.cancel()
+        holder = self._loop.create_task(self._converse(connection, received, head))
+        self._holders[holder] = None
 
-    def _answer(self, connection: "_Connection", head: Head) -> None:
-        """Answers a request, in a thread of its own."""
-        connection.last = head.last or head.method == "HEAD"  # an answer to HEAD has no body
-        try:
-            if "expect" in head.headers:
-                connection.send(CONTINUE)
-            body = connection.body(min(head.length, LARGEST_REQUEST))
-            reply = self._reply(head, body)
-            connection.skip(head.length - len(body))  # with unread bytes the answer would be lost
-            connection.send(reply.as_bytes(last=connection.last))
-        except Exception:  # the client left or was too slow, or the answer failed
-            connection.last = True
-        with self._closing:
-            if self._closed:
-                connection.close()
-                return
-            self._answered.append(connection)
-        self._notify()
-
-    def _take_back(self) -> None:
-        """Takes back connections whose request is answered."""
-        with contextlib.suppress(BlockingIOError):
-            self._woken.recv(1 << 12)
-        while self._answered:
-            connection = self._answered.popleft()
-            connection.busy = False
-            if connection.last or connection not in self._holders:
-                self._drop(connection)
-                continue
-            connection.socket.setblocking(False)
-            connection.until = time.monotonic() + (HEAD_WITHIN if connection.received else IDLE)
-            self._take_request(connection)
-
-    def _watch(self, connection: "_Connection") -> None:
-        if connection.watched:
-            return
-        if connection in self._holders:
-            self._selector.register(connection.socket, selectors.EVENT_READ, connection)
-        else:
-            self._ready_strangers.register(connection.socket, select.EPOLLIN)
-            self._watched_strangers[connection.socket.fileno()] = connection
-        connection.watched = True
-
-    def _try_to_watch(self, connection: "_Connection") -> None:
-        """Watches a connection; drops it if the user's limit of watches is reached."""
-        try:
-            self._watch(connection)
-        except OSError:
-            self._drop(connection)
-
-    def _unwatch(self, connection: "_Connection") -> None:
-        if not connection.watched:
-            return
-        if self._watched_strangers.pop(connection.socket.fileno(), None) is connection:
-            self._ready_strangers.unregister(connection.socket)
-        else:
-            self._selector.unregister(connection.socket)
-        connection.watched = False
-
-    def _drop(self, connection: "_Connection") -> None:
-        self._strangers.pop(connection, None)
-        self._holders.pop(connection, None)
-        if connection.busy:
-            connection.interrupt()
-        else:
-            self._unwatch(connection)
+        def end(_: object) -> None:
+            self._holders.pop(holder, None)
             connection.close()
 
-    def _notify(self) -> None:
-        with contextlib.suppress(OSError):  # full: the gate is awake anyway
-            self._wake.send(b"\0")
+        holder.add_done_callback(end)
 
-    def _end(self) -> None:
-        with self._closing:
-            for connection in [*self._answered]:
-                connection.busy = False  # its thread has ended
-        for connection in [*self._strangers, *self._holders, *self._answered]:
-            self._drop(connection)
-        self._selector.close()
-        self._ready_strangers.close()
-        for each in (self._listener, self._wake, self._woken):
-            each.close()
+    async def _converse(self, connection: socket.socket, received: bytearray, head: Head) -> None:
+        """Answers the requests of a holder, one after the other."""
+        try:
+            while not await self._answered(connection, received, head):
+                async with asyncio.timeout(IDLE):
+                    while not received:
+                        await _receive(connection, received)
+                head = await self._next_head(connection, received)
+        except Refused as refused:
+            await _refuse(connection, refused)
+        except Exception:  # the client left or was too slow, or no thread could be started
+            return
+
+    async def _next_head(self, connection: socket.socket, received: bytearray) -> Head:
+        checked = 0
+        async with asyncio.timeout(HEAD_WITHIN):
+            while (head := self._take_head(received, checked)) is None:
+                checked = len(received)
+                await _receive(connection, received)
+        this: asyncio.Task[None] | None = asyncio.current_task()
+        assert this is not None
+        if this in self._holders:  # it is the youngest now
+            self._holders[this] = self._holders.pop(this)
+        return head
+
+    async def _answered(self, connection: socket.socket, received: bytearray, head: Head) -> bool:
+        """Answers one request; returns whether it was the last one."""
+        length = min(head.length, LARGEST_REQUEST)
+        async with asyncio.timeout(BODY_WITHIN):
+            if "expect" in head.headers:
+                await self._loop.sock_sendall(connection, CONTINUE)
+            while len(received) < length:
+                await _receive(connection, received)
+        body = bytes(received[:length])
+        reply = await self._computed(head, body)
+        async with asyncio.timeout(BODY_WITHIN):  # with unread bytes the answer would be lost
+            left = head.length
+            while len(received) < left:
+                left -= len(received)
+                received.clear()
+                await _receive(connection, received)
+        del received[:left]
+        is_last = head.last or head.method == "HEAD"  # an answer to HEAD has no body
+        async with asyncio.timeout(SENT_WITHIN):
+            await self._loop.sock_sendall(connection, reply.as_bytes(last=is_last))
+        return is_last
+
+    async def _computed(self, head: Head, body: bytes) -> Reply:
+        """Computes an answer in a thread of its own: others may hang."""
+        computed: asyncio.Future[Reply] = self._loop.create_future()
+
+        def give(reply: Reply) -> None:
+            if not computed.done():  # the connection may have been dropped
+                computed.set_result(reply)
+
+        def compute() -> None:
+            reply = self._reply(head, body)
+            with contextlib.suppress(RuntimeError):  # the gate has ended
+                self._loop.call_soon_threadsafe(give, reply)
+
+        threading.Thread(target=compute, daemon=True).start()
+        return await computed
 
 
-class _Connection:
-    """Owned by the gate's thread, or by the answering thread while it is busy."""
+class _Stranger:
+    """A connection that has not shown the token."""
 
-    def __init__(self, accepted: socket.socket, until: float) -> None:
+    def __init__(self, accepted: socket.socket) -> None:
         self.socket = accepted
-        self.socket.setblocking(False)
         with contextlib.suppress(OSError):
-            self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self.until = until  # time to close it, if it is not busy [s]
+            accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.received = bytearray()
         self.checked = 0  # received bytes that are known to hold no whole head
-        self.refusal = b""  # reason still to be sent
-        self.ignored = 0  # bytes received after it was refused
-        self.busy = self.refused = self.last = self.watched = self.closed = False
+        self.next: asyncio.TimerHandle | asyncio.Task[None]  # closes it
 
-    def body(self, length: int) -> bytes:
-        """Waits for the rest of a request. Raises OSError if it does not arrive in time."""
-        end = time.monotonic() + BODY_WITHIN
-        while len(self.received) < length:
-            self.received += self._more(length - len(self.received), end)
-        body = bytes(self.received[:length])
-        del self.received[:length]
-        return body
 
-    def skip(self, length: int) -> None:
-        """Waits for more bytes of a request, drops them. Raises OSError if they do not arrive."""
-        end = time.monotonic() + BODY_WITHIN
-        here = min(length, len(self.received))
-        del self.received[:here]
-        length -= here
-        while length > 0:
-            length -= len(self._more(min(length, LARGEST_REQUEST), end))
+async def _receive(connection: socket.socket, received: bytearray) -> None:
+    """Waits for more bytes. Raises ConnectionError at the end."""
+    await asyncio.sleep(0)  # whoever sends without a pause does not keep the others waiting
+    data = await asyncio.get_running_loop().sock_recv(connection, LARGEST_HEAD)
+    if not data:
+        raise ConnectionError
+    received += data
 
-    def _more(self, most: int, end: float) -> bytes:
-        left = end - time.monotonic()
-        if left <= 0.0:
-            raise TimeoutError
-        self.socket.settimeout(left)
-        data = self.socket.recv(most)
-        if not data:
-            raise ConnectionError
-        return data
 
-    def send(self, data: bytes) -> None:
-        """Waits until all data are sent. Raises OSError if the client does not take them."""
-        self.socket.settimeout(SENT_WITHIN)  # for all of it
-        self.socket.sendall(data)
-
-    def interrupt(self) -> None:
-        """Makes its thread end; another thread calls it."""
-        with contextlib.suppress(OSError):
-            self.socket.shutdown(socket.SHUT_RDWR)
-
-    def close(self) -> None:
-        self.closed = True
-        self.socket.close()
+async def _refuse(connection: socket.socket, refused: Refused | None) -> None:
+    """Sends the reason of a refusal, if there is one; ends when the connection may be closed."""
+    await asyncio.sleep(REFUSED_AFTER)
+    if refused is None:
+        return
+    with contextlib.suppress(OSError):
+        connection.send(Reply(refused.code, f"{refused}\n".encode()).as_bytes(last=True))
+        connection.shutdown(socket.SHUT_WR)
+        await asyncio.sleep(CLOSED_AFTER)  # unread bytes would lose the answer

@@ -16,7 +16,8 @@ HALT = "/halt"
 TOO_LARGE = f"the request is larger than {LARGEST_REQUEST} bytes"
 
 _END = b"\r\n\r\n"
-_CONTROL = re.compile(rb"[\0-\x08\x0b\x0c\x0e-\x1f\x7f]")
+# a control character, LF without CR, CR without LF; the last CR may still lack its LF
+_WRONG = re.compile(rb"[\0-\x08\x0b\x0c\x0e-\x1f\x7f]|(?<!\r)\n|\r(?!\n|\Z)")
 _FIRST_LINE = re.compile(r"([A-Z]{1,20}) (/[!-~]*) HTTP/1\.([01])")
 _NAME = re.compile(r"[\w!#$%&'*+.^`|~-]+", re.ASCII)
 _LENGTH = re.compile(r"[0-9]+")
@@ -50,7 +51,7 @@ def take_head(received: bytearray, checked: int) -> Head | None:
     """
     end = received.find(_END, max(0, checked - len(_END) + 1))
     stop = min(len(received) if end < 0 else end + len(_END), LARGEST_HEAD)
-    if _CONTROL.search(received, checked, stop) or not _lines_end_well(received, checked, stop):
+    if _WRONG.search(received, max(0, checked - 1), stop):
         raise Refused(400, "the head has a control character, or a line that ends without CR LF")
     if end > LARGEST_HEAD or (end < 0 and len(received) > LARGEST_HEAD):
         raise Refused(431, f"the head is longer than {LARGEST_HEAD} bytes")
@@ -66,17 +67,6 @@ def take_head(received: bytearray, checked: int) -> Head | None:
     path, _, query = target.partition("?")
     last = minor == "0" or "close" in headers.get("connection", "").lower()
     return Head(method, path, query, headers, _length(headers, path), last)
-
-
-def _lines_end_well(received: bytearray, checked: int, stop: int) -> bool:
-    """True if each CR has its LF, and the reverse; the last CR may still lack its LF."""
-    before = max(0, checked - 1)
-    both = received.count(b"\r\n", before, stop)
-    return (
-        both
-        == received.count(b"\n", checked, stop)
-        == received.count(b"\r", before, max(before, stop - 1))
-    )
 
 
 def _headers(lines: list[str]) -> dict[str, str]:

@@ -87,10 +87,7 @@ class LiveSource(Source):
 
     @staticmethod
     def extent_of(frontend: Frontend) -> tuple[int, int]:
-        last = frontend.latest().time
-        oldest = frontend.oldest
-        first = frontend.history(since=oldest, until=oldest + GUARD_ROWS)
-        return (int(first.time[0]) if len(first) else last), last
+        return oldest_row(frontend).time, frontend.latest().time
 
     def row(self, time: int | None) -> Observation:
         frontend = self._attached
@@ -99,9 +96,7 @@ class LiveSource(Source):
         try:
             return frontend.at_time(time)
         except RowOverwritten:
-            oldest = frontend.oldest
-            first = frontend.history(since=oldest, until=oldest + GUARD_ROWS)
-            return first[0] if len(first) else frontend.latest()
+            return oldest_row(frontend)
 
     def rows(self, begin: int, end: int) -> History:
         return self._attached.history(from_time=begin, to_time=end)
@@ -157,6 +152,13 @@ class LiveSource(Source):
             "halt": None if halt is None else _halt(halt),
             "problem": loop.trouble if alive else "",
         }
+
+
+def oldest_row(frontend: Frontend) -> Observation:
+    """Returns the oldest row that can be read; the newest one if all are being overwritten."""
+    oldest = frontend.oldest
+    rows = frontend.history(since=oldest, until=oldest + GUARD_ROWS)
+    return rows[0] if len(rows) else frontend.latest()
 
 
 def _halt(halt: Halt) -> dict[str, Any]:

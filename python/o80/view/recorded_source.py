@@ -3,7 +3,7 @@
 import threading
 from bisect import bisect
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -63,18 +63,15 @@ class RecordedSource(Source):
             self._problem = str(error)
 
     def _read_extent(self) -> tuple[int, int]:
-        first = last = None
-        for begin, end in self._chunks:
-            first = self._epoch.history(from_time=begin, to_time=end)
-            if len(first):
-                break
-        for begin, end in reversed(self._chunks):
-            last = self._epoch.history(from_time=begin, to_time=end)
-            if len(last):
-                break
-        if first is None or last is None or not len(first):
+        first, last = self._first_rows_in(self._chunks), self._first_rows_in(self._chunks[::-1])
+        if first is None or last is None:
             raise NothingToShow(f"the recording has no row of '{self.label}'")
         return int(first.time[0]), int(last.time[-1])
+
+    def _first_rows_in(self, stretches: Iterable[tuple[int, int]]) -> History | None:
+        """Returns the rows of the first stretch [ns] that has any; None: none has."""
+        read = (self._epoch.history(from_time=begin, to_time=end) for begin, end in stretches)
+        return next((rows for rows in read if len(rows)), None)
 
     @property
     def schema(self) -> dict[str, Any]:
@@ -103,12 +100,11 @@ class RecordedSource(Source):
 
     def _before(self, time: int) -> Observation:
         """Returns the newest row before a gap."""
-        for begin, end in reversed(self._chunks):
-            if begin <= time:
-                found = self._epoch.history(from_time=begin, to_time=min(end, time))
-                if len(found):
-                    return found[-1]
-        raise NothingToShow(f"the recording has no row of '{self.label}' there")
+        before = ((begin, min(end, time)) for begin, end in self._chunks[::-1] if begin <= time)
+        found = self._first_rows_in(before)
+        if found is None:
+            raise NothingToShow(f"the recording has no row of '{self.label}' there")
+        return found[-1]
 
     def time_with(self, other: Source, row: Observation) -> int | None:
         if not isinstance(other, RecordedSource) or not self._epoch.overlaps(other._epoch):

@@ -18,6 +18,7 @@ from o80.view.world import Drawn
 
 SHAPES = {0: "plane", 2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box", 7: "mesh"}
 DRAWN_GROUPS = 3  # geoms of groups 0 to 2; the others are shapes for collisions
+FREE = 0  # type of the joint of a floating body
 USUAL_COLOUR = (0.5, 0.5, 0.5, 1.0)  # of a geom that has none
 
 
@@ -60,7 +61,7 @@ class Scene:
             raise Error(f"the model of the robot cannot be read: {error}") from error
 
     def _place(self, value: dict[str, Any], schema: dict[str, Any]) -> "_Place | None":
-        """Finds where a value goes; None if the model has no such joint or body."""
+        """Finds where a value goes; None if the model has no such joint or floating body."""
         kind = self._mujoco.mjtObj
         joint = value["what"] == "joint"
         if joint:
@@ -68,7 +69,7 @@ class Scene:
         else:
             body = self._mujoco.mj_name2id(self.model, kind.mjOBJ_BODY, value["name"])
             found = int(self.model.body_jntadr[body]) if body >= 0 else -1
-        if found < 0:
+        if found < 0 or (not joint and self.model.jnt_type[found] != FREE):
             return None
         row = schema["row"]
         extended = value["from"] == "extended"
@@ -231,6 +232,7 @@ def _share(schema: dict[str, Any], offset: int) -> tuple[float, float] | None:
     for actuator in schema["actuators"]:
         fields = schema["groups"][actuator["group"]]["type"]["fields"]
         low, high = actuator["limits"][0]["minimum"], actuator["limits"][0]["maximum"]
-        if actuator["offset"] == offset and fields[0]["unit"] == "1" and None not in (low, high):
+        is_share = actuator["offset"] == offset and fields[0]["unit"] == "1"
+        if is_share and None not in (low, high) and low < high:
             return low, high
     return None

@@ -6,9 +6,9 @@ import resource
 import sys
 import threading
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
-from o80.base.errors import Error
 from o80.base.stop_request import StopRequest
 from o80.view.answers import Answers
 from o80.view.server import PageServer
@@ -39,19 +39,13 @@ def page_server(
     )
     thread = threading.Thread(target=server.serve, daemon=True)
     thread.start()
-
-    def prepare() -> None:
-        with contextlib.suppress(Error):
-            answers.look({})  # reads the models while the browser opens the page
-
-    preparing = threading.Thread(target=prepare, daemon=True)
-    preparing.start()
-    try:
-        yield server
-    finally:
-        server.close()
-        thread.join()
-        preparing.join()  # its imports must not outlive the interpreter
+    with ThreadPoolExecutor(1) as preparing:  # its imports must not outlive the interpreter
+        preparing.submit(answers.look, {})  # reads the models while the browser opens the page
+        try:
+            yield server
+        finally:
+            server.close()
+            thread.join()
 
 
 def allow_descriptors(wanted: int) -> None:

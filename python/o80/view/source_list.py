@@ -27,7 +27,7 @@ class SourceList:
         """
         self._model_files = model_files
         self._recorded: list[Source] = []
-        self._names: list[str] = []
+        self._live: dict[str, LiveSource] = {}
         self._patterns: list[str] = []
         distinct = dict.fromkeys(names)
         for name in distinct:
@@ -39,12 +39,9 @@ class SourceList:
             elif any(character in name for character in "*?["):
                 self._patterns.append(name)
             else:
-                self._names.append(name)
+                self._live[name] = LiveSource(name, model_files=model_files)
         if not names:
             self._patterns.append("*")
-        self._live: dict[str, LiveSource] = {
-            name: LiveSource(name, model_files=model_files) for name in self._names
-        }
         self._lock = threading.Lock()
         self._look_at = 0.0
 

@@ -153,8 +153,11 @@ def test_a_living_robot_keeps_its_name(recorded: Path, segment: str) -> None:
     [
         ({"speed": 0.0}, "speed must be positive"),
         ({"begin": -1.0}, "begin must be a number of seconds from 0"),
+        ({"begin": 1e308}, "begin must be a number of seconds from 0"),
+        ({"begin": 10.0, "end": math.inf}, "has no row in the requested part"),
         ({"begin": 2.0, "end": 1.0}, "end must be later than begin"),
         ({"history": 0}, "history"),
+        ({"history": 2**63}, "history must be less than"),
     ],
 )
 def test_mistakes_are_named(recorded: Path, arguments: dict[str, Any], message: str) -> None:

@@ -133,6 +133,8 @@ def test_a_stretch_without_rows_says_so(
         cut(day, tmp_path / "other.mcap", "2", "1")
     with pytest.raises(o80.InvalidArgument, match=r"--from 100 is after the end: .* s$"):
         cut(day, tmp_path / "other.mcap", "100")
+    with pytest.raises(o80.InvalidArgument, match=r"--to: write 10:02.* not '1e308'"):
+        cut(day, tmp_path / "other.mcap", "0", "1e308")
     with pytest.raises(o80.RecordingError, match="exists"):
         cut(day, day, "0", "1")
 

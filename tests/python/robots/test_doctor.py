@@ -1,7 +1,6 @@
 """The doctor: findings on recorded computers, and texts about files that it cannot read."""
 
 import json
-import os
 import re
 import shlex
 import subprocess
@@ -17,7 +16,7 @@ import o80
 from o80.robots.doctor import wake_ups
 from o80.robots.doctor.check import Finding
 from o80.robots.doctor.checks import CHECKS, Priority
-from o80.robots.doctor.computer import MAX_BYTES, list_of, processors_of
+from o80.robots.doctor.computer import list_of, processors_of
 from o80.robots.doctor.doctor import Report
 from o80.robots.doctor.wake_ups import WakeUps, measure, measure_beside_load
 from o80.robots.process import Process
@@ -38,7 +37,6 @@ EXPECTED = {
     ),
     ("laptop", 1000): (BARE, ["throttling", "autogroup", "transparent huge pages"]),
     ("laptop", 10): (["priority limit", "swap"], ["throttling", "autogroup"]),
-    ("laptop", 1): ([], []),
     ("virtual_machine", 1000): (
         ["kernel without PREEMPT_RT", "virtual machine"],
         ["throttling", "transparent huge pages"],
@@ -46,10 +44,6 @@ EXPECTED = {
     ("virtual_machine", 10): ([], ["throttling"]),
     ("container", 1000): (
         ["processor quota", "priority limit", "locked memory limit", "kernel without PREEMPT_RT"],
-        ["size of /dev/shm", "throttling", "autogroup"],
-    ),
-    ("container", 10): (
-        ["processor quota", "priority limit"],
         ["size of /dev/shm", "throttling", "autogroup"],
     ),
 }
@@ -262,7 +256,6 @@ FAILED = WakeUps(1000.0, 2.0, failed="no space left in /dev/shm")
         ("workstation", HELD, MISSED, " a load: because of the kernel without PREEMPT_RT."),
         ("preempt_rt", HELD, replace(HELD, failed="'arm' runs on this computer"), ""),
         ("laptop", FAILED, MISSED, "could not be measured on this computer: no space left"),
-        ("preempt_rt", FAILED, None, "could not be measured on this computer: no space left"),
     ],
 )
 def test_a_computer_that_missed_periods_does_not_serve_even_without_a_cause(
@@ -336,18 +329,12 @@ def holds(content: bytes) -> Callable[[Path], object]:
 DAMAGES: dict[str, Callable[[Path], object]] = {
     "missing": lambda _: None,
     "a folder": Path.mkdir,
-    "a pipe": os.mkfifo,
-    "a device": lambda file: file.symlink_to("/dev/zero"),
     "empty": holds(b""),
-    "zeros": holds(b"\0" * 100),
     "words": holds(b"not what was expected\n"),
     "a huge number": holds(b"9" * 100_000),
-    "negative": holds(b"-1 -1 -1 -1\n"),
-    "numbers": holds(b"1 2 3 4 5 6 7 8 9 10\n" * 50),
     "endless lists": holds(b"0-99999999,5\n" * 50),
     "braces": holds(b"{0} {name} {} ((((( :: ,,, --- %s %d\n" * 50),
     "not text": holds(bytes(range(256)) * 20),
-    "huge": holds(b"x" * (MAX_BYTES + 1)),
 }
 NEEDED = {
     f"/proc/{name}"
@@ -377,7 +364,7 @@ def test_no_damage_of_all_files_makes_the_doctor_fail(tmp_path: Path, kind: str)
     report = RecordedComputer(tmp_path, "").examine(1000)
 
     assert json.dumps(report.as_dict())
-    if kind in ("missing", "a folder", "a pipe", "a device", "empty", "zeros", "huge"):
+    if kind in ("missing", "a folder", "empty"):
         assert set(report.unread) >= NEEDED
         assert "as far as could be read" in report.verdict or report.culprits
 
@@ -385,17 +372,14 @@ def test_no_damage_of_all_files_makes_the_doctor_fail(tmp_path: Path, kind: str)
 def test_what_could_not_be_read_is_part_of_the_verdict(tmp_path: Path) -> None:
     computer = recorded("preempt_rt", tmp_path)
     computer.change("proc/interrupts", None)
+    computer.change("proc/sys/kernel/sched_rt_runtime_us", "many\n")
     report = computer.examine(1000)
     assert report.serves
     assert report.verdict.endswith("1000 Hz, as far as could be read.")
-    assert report.unread == {"/proc/interrupts": "it is not there"}
-
-
-def test_a_number_that_is_none_is_said_with_its_file(tmp_path: Path) -> None:
-    computer = recorded("preempt_rt", tmp_path)
-    computer.change("proc/sys/kernel/sched_rt_runtime_us", "many\n")
-    reason = computer.examine(1000).unread["/proc/sys/kernel/sched_rt_runtime_us"]
-    assert reason == "'many' is not a number"
+    assert report.unread == {
+        "/proc/interrupts": "it is not there",
+        "/proc/sys/kernel/sched_rt_runtime_us": "'many' is not a number",
+    }
 
 
 def test_lists_of_processors_are_read_and_written() -> None:

@@ -19,8 +19,10 @@ from o80.recording.joint_states import joints_of
 from o80.view import foreign_model
 from o80.view.answers import Answers
 from o80.view.curves import STRETCHES, drawn_rows
+from o80.view.scene import Scene
 from o80.view.source_list import SourceList
 from o80.view.urdf import Links
+from o80.view.world import Drawn, Standing
 
 Look = Callable[..., dict[str, Any]]
 Floats = NDArray[np.float64]
@@ -241,7 +243,8 @@ def test_segments_of_one_name_are_told_apart_by_their_file(
 
 
 def test_a_backend_in_python_names_a_model_and_what_moves_it(segment: str, tmp_path: Path) -> None:
-    body = "<body name='{0}'><joint name='{0}' axis='0 1 0'/><geom size='0.1'/></body>"
+    joint = "<joint name='{0}' axis='0 1 0' range='-90 90'/>"
+    body = f"<body name='{{0}}'>{joint}<geom size='0.1'/></body>"
     model = tmp_path / "arm.xml"
     bodies = "".join(body.format(name) for name in ("shoulder", "wrist"))
     model.write_text(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
@@ -249,14 +252,23 @@ def test_a_backend_in_python_names_a_model_and_what_moves_it(segment: str, tmp_p
         with o80.Backend(
             segment,
             ["turn"],
+            {"share": float},
+            units={"share": "1"},
+            limits={"turn": (0.5, 0.5)},  # nothing to spread over the range of the joint
             extended={"angles": (np.float64, 3)},
             model=given,
             joints={"shoulder": "turn", "wrist": ("angles", 2)},
         ) as backend:
-            backend.publish([0.5], {"angles": [0, 0, -0.25]})
+            backend.publish([(0.5,)], {"angles": [0, 0, -0.25]})
             pose = pose_of(looks_at(segment)())
         assert pose[0, 3:] == pytest.approx(turn_about_y(0.5), abs=1e-6)
         assert pose[1, 3:] == pytest.approx(turn_about_y(-0.25), abs=1e-6)
+
+
+def test_a_place_for_a_body_that_does_not_float_is_left_out(arm: o80.Frontend) -> None:
+    place = {"what": "position", "name": "lower", "from": "states", "offset": 0}
+    what = Drawn(arm.model, {"file": "", "values": [place]}, True, Standing())
+    assert Scene(arm.schema, what).poses(arm.latest())["pose"]
 
 
 MODEL = "<mujoco><worldbody>{}</worldbody></mujoco>"

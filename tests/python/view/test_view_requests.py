@@ -19,7 +19,6 @@ from o80.view.server import PageServer
 def server(arm: o80.Frontend, monkeypatch: pytest.MonkeyPatch) -> Iterator[PageServer]:
     """One that refuses without delay."""
     monkeypatch.setattr("o80.view.gate.REFUSED_AFTER", 0.0)
-    monkeypatch.setattr("o80.view.gate.TICK", 0.005)
     arm.burst(5)
     with page_server([arm.segment]) as server:
         yield server

@@ -7,7 +7,6 @@ with Collector(make, seed=1) as collector:
 Needs the extra `stable-baselines3`. See docs/learning/rollouts.md.
 """
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -185,7 +184,7 @@ class RolloutPPO(PPO):
             seen = self._tensor(self._normalised(rollout.observations[:-1])).flatten(0, 1)
             acted = self._tensor(rollout.actions).flatten(0, 1)
             _, log_probabilities, _ = self.policy.evaluate_actions(seen, acted)
-            cut, last = ends.cut_off()
+            cut, last = ends.cut_off
             if len(last):
                 rewards[cut] += self.gamma * self._values(last).numpy()
         return rewards, values, log_probabilities.reshape(steps, count)
@@ -204,33 +203,20 @@ class _Ends:
     """The ends of the episodes of a rollout, as Stable-Baselines3 names what belongs to them."""
 
     def __init__(self, rollout: Rollout) -> None:
-        self._rollout = rollout
+        ends = rollout.ends
+        is_cut = ~rollout.terminated[ends.steps, ends.copies]
+        #: index (steps, copies) and last observations of merely truncated episodes
+        self.cut_off = (ends.steps[is_cut], ends.copies[is_cut]), ends.observations[is_cut]
+        self._copies = rollout.rewards.shape[1]
         self._infos: dict[int, dict[int, Info]] = {}
-        for step, copy, info in self._ends():
-            self._infos.setdefault(step, {})[copy] = info
+        for i, step in enumerate(ends.steps.tolist()):
+            info = {name: values[i] for name, values in ends.infos.items()}
+            info["terminal_observation"] = ends.observations[i]
+            info["TimeLimit.truncated"] = bool(is_cut[i])
+            info["episode"] = {"r": float(ends.rewards[i]), "l": int(ends.lengths[i])}
+            self._infos.setdefault(step, {})[int(ends.copies[i])] = info
 
     def infos(self, step: int) -> list[Info]:
         """Returns infos of all copies for Stable-Baselines3, with entries for ended episodes."""
         ended = self._infos.get(step, {})
-        return [ended.get(copy, {}) for copy in range(self._rollout.rewards.shape[1])]
-
-    def cut_off(self) -> tuple[tuple[list[int], list[int]], NDArray[Any]]:
-        """Returns index (steps, copies) and last observations of merely truncated episodes."""
-        found = [
-            (step, copy, info["terminal_observation"])
-            for step, copy, info in self._ends()
-            if info["TimeLimit.truncated"]
-        ]
-        steps, copies = [each[0] for each in found], [each[1] for each in found]
-        return (steps, copies), np.array([each[2] for each in found])
-
-    def _ends(self) -> Iterator[tuple[int, int, Info]]:
-        ends, terminated = self._rollout.ends, self._rollout.terminated
-        for number in range(len(ends.steps)):
-            step, copy = int(ends.steps[number]), int(ends.copies[number])
-            info = {name: values[number] for name, values in ends.infos.items()}
-            info["terminal_observation"] = ends.observations[number]
-            info["TimeLimit.truncated"] = not terminated[step, copy]
-            reward, length = float(ends.rewards[number]), int(ends.lengths[number])
-            info["episode"] = {"r": reward, "l": length}
-            yield step, copy, info
+        return [ended.get(copy, {}) for copy in range(self._copies)]

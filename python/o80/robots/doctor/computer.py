@@ -1,14 +1,10 @@
 """Reads properties of a computer from kernel files below a root folder, which tests replace."""
 
-import os
 import re
-import stat
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-MAX_BYTES = 4 << 20  # of a file: /proc/interrupts of 256 processors has 1 MB
-PIECE = 1 << 16
 MAX_PROCESSORS = 8192  # of a list such as "0-3,8"
 SYS_NICE, IPC_LOCK = 23, 14  # bits of capabilities
 CPU = "sys/devices/system/cpu"
@@ -53,24 +49,13 @@ class Computer:
     def text(self, path: str, *, needed: bool = False) -> str:
         """Reads the stripped text of a file. needed: every kernel has it, so note its absence."""
         try:
-            # a pipe in its place would block, a device never end
-            descriptor = os.open(self.root / path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-            with open(descriptor, "rb", buffering=0) as file:
-                if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-                    raise OSError("it is not a file")
-                content = bytearray()
-                # in pieces: files of /proc/sys refuse large buffers
-                while len(content) <= MAX_BYTES and (piece := file.read(PIECE)):
-                    content += piece
+            content = (self.root / path).read_bytes()
         except (FileNotFoundError, NotADirectoryError):
             if needed:
                 self.note(path, "it is not there")
             return ""
         except OSError as error:
             self.note(path, error.strerror or str(error))
-            return ""
-        if len(content) > MAX_BYTES:
-            self.note(path, f"it is larger than {MAX_BYTES >> 20} MiB")
             return ""
         found = content.decode(errors="replace").replace("\0", " ").strip()
         if needed and not found:
