@@ -27,7 +27,7 @@ from o80.base.descriptors import open_standard_streams
 from o80.errors import InvalidArgument
 from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL, Launch, LaunchModel
 from o80_devices.ball_launcher.recorded_shots import Setting, Shot, recorded_shots
-from o80_devices.cameras.rig import Rig, Table
+from o80_devices.cameras.flight import Flight, FlightLaw, Table
 
 TABLE = Table(middle=(1.38, 0.0, 0.742), half=(1.37, 0.7625))
 """Table in the frame of the launcher; the height is read from the recorded bounces."""
@@ -188,26 +188,21 @@ def _misses(model: LaunchModel, shots: Sequence[Shot], table: Table | None = TAB
 
 
 def _flight(ball: Launch, duration: float, table: Table | None = TABLE) -> FloatArray:
-    """Computes the positions (T, 3) of a ball, one for each PERIOD [m]."""
-    law = Rig(cameras=(), table=table).law()
-    position, velocity, spin = ball.position, ball.velocity, ball.spin
-    positions = [position]
-    for _ in range(round(duration / PERIOD)):
-        position, velocity, spin, _ = law.advance(position, velocity, spin, PERIOD)
-        positions.append(position)
-    return np.array(positions)
+    """Computes the flight of a ball: rows (K, 4) of time [s] and position [m]."""
+    start = np.concatenate([ball.position, ball.velocity, ball.spin])
+    return FlightLaw(Flight(), table).path(start, duration, PERIOD)[:, :4]
 
 
 def _missed(flight: FloatArray, shot: Shot) -> FloatArray:
     """Returns flight minus position for each row (N, 3); the first rows give the launch time."""
-    times = PERIOD * np.arange(len(flight))
+    times, *axes = flight.T
 
     def at(moments: FloatArray) -> FloatArray:
-        return np.stack([np.interp(moments, times, column) for column in flight.T], axis=1)
+        return np.stack([np.interp(moments, times, axis) for axis in axes], axis=1)
 
     lead = round(LEAD / PERIOD)
     first = shot.positions[:FIRST_ROWS]
-    begin = float(np.interp(first[0, 0], flight[:lead, 0], times[:lead]))
+    begin = float(np.interp(first[0, 0], axes[0][:lead], times[:lead]))
     since = shot.stamps[:FIRST_ROWS] + begin
     velocity = (at(since + PERIOD) - at(since)) / PERIOD
     begin += float(((first - at(since)) * velocity).sum() / (velocity**2).sum())

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from o80.base.arrays import FloatArray
-from o80_devices import _vision
+from o80_devices.ball_tracking.ball_filter import GATE, BallFilter
 from o80_devices.ball_tracking.ball_row import Reason
+from o80_devices.cameras.flight import FlightLaw
 
 NANOSECOND = 1e-9
 FASTEST = 20.0
@@ -72,10 +73,10 @@ class Point:
 class FlightTrack:
     """Tracks one ball. Two unexpected positions that agree mean a hit or another ball."""
 
-    def __init__(self, law: _vision.FlightLaw, forget: float) -> None:
+    def __init__(self, law: FlightLaw, forget: float) -> None:
         self._law = law
         self._longest = forget
-        self._filter = _vision.BallFilter(law)
+        self._filter = BallFilter(law)
         self._last: Point | None = None  # the last sighting of the ball
         self._surprise: Point | None = None
         self._time = 0  # time of the filter [ns]
@@ -95,7 +96,7 @@ class FlightTrack:
         if self._last is None:
             return None, 0.0
         spread = float(np.sqrt(np.max(np.diag(self._filter.covariance)[:3])))
-        return self._filter.position, spread
+        return self._filter.ball[:3], spread
 
     def lost(self, time: int, reason: Reason) -> Tracked:
         self._predict_to(time)
@@ -121,13 +122,14 @@ class FlightTrack:
         if reason != Reason.seen:
             return Tracked(time, reason)
         self._last = point
+        position, velocity, spin = self._filter.ball.reshape(3, 3)
         return Tracked(
             time,
             Reason.seen,
             self._balls,
-            self._filter.position,
-            self._filter.velocity,
-            self._filter.spin,
+            position,
+            velocity,
+            spin,
             self._filter.covariance,
             place,
             cameras,
@@ -141,7 +143,7 @@ class FlightTrack:
             self._filter.begin(point.place, covariance)
             self._surprise = None
             return Reason.seen
-        if self._filter.distance(point.place, covariance) <= self._filter.gate:
+        if self._filter.distance(point.place, covariance) <= GATE:
             self._filter.update(point.place, covariance)
             self._surprise = None
             return Reason.seen

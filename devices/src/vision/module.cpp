@@ -1,4 +1,4 @@
-// o80_devices._vision: cameras, detection, consensus and the filter of a ball, for Python.
+// o80_devices._vision: cameras, detection and consensus, for Python.
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -18,7 +18,6 @@
 #include "vision/blobs.hpp"
 #include "vision/camera.hpp"
 #include "vision/consensus.hpp"
-#include "vision/filter.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;  // NOLINT(google-build-using-namespace)
@@ -36,7 +35,6 @@ using Table =
 using Bytes = nb::ndarray<const std::uint8_t, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
 using Three = std::array<double, 3>;
 using Place = nb::ndarray<const double, nb::shape<3>, nb::c_contig, nb::device::cpu>;
-using Square = nb::ndarray<const double, nb::shape<3, 3>, nb::c_contig, nb::device::cpu>;
 using Nine = std::array<double, 9>;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
@@ -59,12 +57,6 @@ Doubles array_of(const Matrix<R, C>& matrix) {
 }
 
 Vector vector(const Place& values) { return {{values(0), values(1), values(2)}}; }
-
-Matrix<3, 3> square(const Square& values) {
-  Matrix<3, 3> made;
-  std::copy_n(values.data(), made.values.size(), made.values.begin());
-  return made;
-}
 
 Camera camera(const std::array<double, 2>& size, const std::array<double, 2>& focal,
               const std::array<double, 2>& centre, const std::array<double, 5>& distortion,
@@ -163,87 +155,13 @@ std::optional<std::tuple<Doubles, Doubles, std::uint64_t, double>> locate_ball(
                     found->residual);
 }
 
-std::tuple<Doubles, Doubles, Doubles, int> advance(const FlightLaw& law, const Place& position,
-                                                   const Place& velocity, const Place& spin,
-                                                   double duration) {
-  int bounces = 0;
-  const Ball end =
-      advanced({vector(position), vector(velocity), vector(spin)}, law, duration, bounces);
-  return {array_of(end.position), array_of(end.velocity), array_of(end.spin), bounces};
-}
-
-void bind_filter(nb::module_& module) {
-  nb::class_<FlightLaw>(module, "FlightLaw", "Air, gravity and the table; see flight.hpp.")
-      .def(nb::init<>())
-      .def_rw("drag", &FlightLaw::drag)
-      .def_rw("magnus", &FlightLaw::magnus)
-      .def_rw("saturation", &FlightLaw::saturation)
-      .def_rw("spin_decay", &FlightLaw::spin_decay)
-      .def_rw("radius", &FlightLaw::radius)
-      .def_rw("has_table", &FlightLaw::has_table)
-      .def_prop_rw(
-          "gravity", [](const FlightLaw& law) { return law.gravity.values; },
-          [](FlightLaw& law, const Three& value) { law.gravity.values = value; })
-      .def_prop_rw(
-          "table", [](const FlightLaw& law) { return law.table.values; },
-          [](FlightLaw& law, const Three& value) { law.table.values = value; })
-      .def_rw("half", &FlightLaw::half)
-      .def_rw("kept_normal", &FlightLaw::kept_normal)
-      .def_rw("kept_tangential", &FlightLaw::kept_tangential)
-      .def_rw("friction", &FlightLaw::friction)
-      .def("advance", &advance, "position"_a, "velocity"_a, "spin"_a, "duration"_a,
-           "Position, velocity and spin after a time [s], and the number of bounces.");
-
-  nb::class_<BallFilter>(module, "BallFilter", "A Kalman filter with the law of flight.")
-      .def(
-          "__init__",
-          [](BallFilter* self, const FlightLaw& law) { new (self) BallFilter(law, {}); }, "law"_a)
-      .def(
-          "begin",
-          [](BallFilter& self, const Place& point, const Square& covariance,
-             const std::optional<Place>& velocity, double spread) {
-            if (velocity) {
-              self.begin(vector(point), square(covariance), vector(*velocity), spread);
-            } else {
-              self.begin(vector(point), square(covariance));
-            }
-          },
-          "point"_a, "covariance"_a, "velocity"_a = nb::none(), "spread"_a = 1.0)
-      .def("predict", &BallFilter::predict, "duration"_a)
-      .def(
-          "distance",
-          [](const BallFilter& self, const Place& point, const Square& covariance) {
-            return self.distance(vector(point), square(covariance));
-          },
-          "point"_a, "covariance"_a)
-      .def(
-          "update",
-          [](BallFilter& self, const Place& point, const Square& covariance) {
-            self.update(vector(point), square(covariance));
-          },
-          "point"_a, "covariance"_a)
-      .def_prop_ro("gate", [](const BallFilter& self) { return self.rule().gate; })
-      .def_prop_ro(
-          "position", [](const BallFilter& self) { return array_of(self.ball().position); },
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "velocity", [](const BallFilter& self) { return array_of(self.ball().velocity); },
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "spin", [](const BallFilter& self) { return array_of(self.ball().spin); },
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "covariance", [](const BallFilter& self) { return array_of(self.covariance()); },
-          nb::rv_policy::automatic);
-}
-
 }  // namespace
 
 }  // namespace o80::vision
 
 NB_MODULE(_vision, module) {
   using namespace o80::vision;  // NOLINT(google-build-using-namespace)
-  module.doc() = "Cameras, detection of a ball in images, its place and its flight.";
+  module.doc() = "Cameras, detection of a ball in images, and its place.";
   nb::class_<Camera>(module, "Camera", "A pinhole camera with distortion, as OpenCV writes it.")
       .def(
           "__init__",
@@ -273,5 +191,4 @@ NB_MODULE(_vision, module) {
              "expected"_a = nb::none(),
              "sightings (n, 4): camera, x, y, area => point, covariance, cameras as bits, residual "
              "[px] of the largest consistent subset; None: no cameras agree.");
-  bind_filter(module);
 }
