@@ -31,7 +31,7 @@ def test_it_learns_velocity_and_spin_of_a_flight_with_a_bounce() -> None:
 
 def test_it_follows_a_ball_that_bounces_otherwise_than_by_the_law() -> None:
     ball = np.array([0.5, 3.0, 1.1, 0.2, -4.2, 1.6, 0, 0, 0])
-    other = FlightLaw(Flight(), Table(kept_normal=0.82, kept_tangential=0.4))
+    other = FlightLaw(Flight(), Table(kept_normal=0.7, kept_tangential=0.4))
     estimate = BallFilter(LAW)
     estimate.begin(ball[:3], EXACT)
     for _ in range(149):

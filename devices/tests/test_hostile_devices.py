@@ -17,6 +17,7 @@ import o80
 from o80_devices.ball_tracking.server_messages import (
     LARGEST_MESSAGE,
     Message,
+    Options,
     ServerReason,
     ServerTrack,
 )
@@ -184,7 +185,7 @@ def test_two_drivers_read_one_server(segment: str) -> None:
 @example(b'{"time": true, "obs": null}')
 @example('{"time": 1, "obs": "\ud83d"}'.encode("utf-16", "surrogatepass"))
 def test_a_message_of_any_bytes_is_a_row_without_a_ball(content: bytes) -> None:
-    seen = ServerTrack().take(content, 10**9)
+    seen = ServerTrack(Options()).take(content, 10**9)
     assert seen.reason in (ServerReason.invalid, ServerReason.not_seen, ServerReason.seen)
     if seen.reason != ServerReason.seen:
         assert np.isnan(seen.ball.position).all()

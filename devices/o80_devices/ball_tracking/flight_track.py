@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -54,6 +55,12 @@ class Tracked:
     def error(self) -> float:
         """Standard deviation of the position, over all three axes [m]."""
         return float(np.sqrt(np.trace(self.covariance[:3, :3])))
+
+    def fields(self) -> dict[str, Any]:
+        """Values that the rows of all trackers have."""
+        names = ("ball", "position", "velocity", "spin", "error", "measured")
+        values = {name: getattr(self, name) for name in names}
+        return values | {"capture_time": self.time if self.seen else 0}
 
 
 @dataclass(frozen=True)

@@ -122,9 +122,14 @@ class ImageSource:
 
     def wait(self, timeout: float) -> None:
         """Waits for images of the first segment, or until the timeout [s] has passed."""
-        end = time.monotonic() + timeout
-        if not self._segments[0].wait(timeout):
-            time.sleep(max(0.0, end - time.monotonic()))
+        self.wait_until(time.monotonic_ns() + round(timeout * 1e9))
+
+    def wait_until(self, deadline: int) -> bool:
+        """Waits for images of the first segment, until a deadline [ns]. Returns if any came."""
+        came = self._segments[0].wait((deadline - time.monotonic_ns()) * 1e-9)
+        if not came:
+            time.sleep(max(0, deadline - time.monotonic_ns()) * 1e-9)
+        return came
 
     def read(self, now: float) -> Images | None:
         """Returns unread images, or None. Raises InvalidArgument if they do not match the rig."""

@@ -92,12 +92,12 @@ class Rig:
             read = json.loads(Path(path).read_text())
             if not isinstance(read, dict) or read.pop("format", None) != FORMAT:
                 raise InvalidArgument(f'"format" must be "{FORMAT}"')
-            cameras = tuple(RigCamera(**_tuples(each)) for each in read["cameras"])
+            cameras = tuple(RigCamera(**with_tuples(each)) for each in read["cameras"])
             table = read.get("table")
             rig = Rig(
                 cameras,
-                Flight(**_tuples(read.get("flight", {}))),
-                None if table is None else Table(**_tuples(table)),
+                Flight(**with_tuples(read.get("flight", {}))),
+                None if table is None else Table(**with_tuples(table)),
             )
             rig.check()
         except (OSError, KeyError, TypeError, ValueError) as error:
@@ -118,7 +118,8 @@ class Rig:
             raise InvalidArgument("a value of the flight or table is not a number") from None
 
 
-def _tuples(fields: dict[str, Any]) -> dict[str, Any]:
+def with_tuples(fields: dict[str, Any]) -> dict[str, Any]:
+    """Fields of JSON with flat tuples in place of lists."""
     return {k: tuple(np.ravel(v).tolist()) if isinstance(v, list) else v for k, v in fields.items()}
 
 
