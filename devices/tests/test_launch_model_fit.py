@@ -52,6 +52,7 @@ def assert_same(one: LaunchModel, other: LaunchModel, share: float) -> None:
         assert abs(difference) < share * SCALES[name], name
 
 
+@pytest.mark.check  # needs SciPy
 @pytest.mark.recordings("spin_2022")
 def test_the_constants_of_the_model_come_from_half_of_the_recorded_shots() -> None:
     shots = recorded_shots([DATA])
@@ -66,6 +67,7 @@ def test_the_constants_of_the_model_come_from_half_of_the_recorded_shots() -> No
     np.testing.assert_allclose(scatter_of(found, shots), expected, rtol=0.2)
 
 
+@pytest.mark.check  # needs SciPy
 def test_the_fit_finds_the_numbers_of_a_known_model(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

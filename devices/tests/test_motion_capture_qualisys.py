@@ -113,24 +113,6 @@ def test_bodies_are_found_and_their_poses_are_those_of_the_server(system: o80.Fr
     assert row.frame_number * 5000 == row.stamp
 
 
-def test_a_rotation_about_all_axes_is_not_its_transpose(segment: str) -> None:
-    """(0.1, 0.2, 0.3, w), whose matrix has nine different numbers."""
-    x, y, z = 0.1, 0.2, 0.3
-    w = math.sqrt(1 - x * x - y * y - z * z)
-    rows = (
-        *(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        *(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        *(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    with (
-        FakeQualisys(["racket"], poses=lambda *_: ((1.0, 2.0, 3.0), rows)) as server,
-        ROBOT.inline(segment, frequency=1000, port=server.port) as system,
-    ):
-        row = row_where(system, is_seen)
-        assert row.racket.quaternion == pytest.approx((x, y, z, w), abs=1e-6)
-        assert row.racket.position == pytest.approx((1.0, 2.0, 3.0))
-
-
 def test_a_hidden_body_is_marked_and_has_no_numbers(
     server: FakeQualisys, system: o80.Frontend
 ) -> None:

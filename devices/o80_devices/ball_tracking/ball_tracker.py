@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -58,7 +57,7 @@ class BallTracker:
         self._pace.wait(due, self._source.wait_until)
 
     def read(self, reading: Reading) -> None:
-        images = self._source.read(time.monotonic())
+        images = self._source.read()
         if images is None:
             reading.missed()
             ball, taken, error = Tracked(reading.time, Reason.no_image), 0, 0

@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 import o80
+from o80.base.extras import needed
 from o80.drivers import Reading
 from o80.errors import DriverError
-from o80_devices import zeromq
 from o80_devices.ball_tracking.ball_row import EXTENDED, UNITS
 from o80_devices.ball_tracking.server_messages import Options, ServerReason, ServerTrack
 
@@ -48,7 +48,7 @@ class TrackingServer:
         self._socket: Any = None
 
     def start(self) -> None:
-        self._zmq = zmq = zeromq.required()
+        self._zmq = zmq = needed("zmq", "zeromq", "a tracking server", package="o80-devices")
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.SUB)
         self._socket.setsockopt(zmq.CONFLATE, 1)  # a queue of one, the newest message

@@ -99,7 +99,7 @@ def boards_from_segments(
     last = time.monotonic()
     while any(len(found) < count for found in boards):
         source.wait(0.05)
-        images = source.read(time.monotonic())
+        images = source.read()
         for camera, found, image in zip(
             cameras, boards, images.images if images else [None] * len(cameras), strict=True
         ):

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from o80.base.extras import needed
 from o80.base.screen import keep_printing
-from o80_devices import zeromq
 from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL, Launch, LaunchModel
 from o80_devices.ball_launcher.messages import Kind, Request, State
 from o80_devices.ball_launcher.wheel_speeds import actuation_of, speed_of
@@ -64,7 +64,7 @@ class FakeLauncher:
         on_launch: Callable[[Launch], None] | None = None,
         say: Callable[[str], None] | None = None,
     ) -> None:
-        self._zmq = zeromq.required()
+        self._zmq = needed("zmq", "zeromq", "the ball launcher", package="o80-devices")
         self._context = self._zmq.Context()
         self._behaviour = behaviour
         self._model = model
@@ -253,6 +253,7 @@ def main(arguments: list[str] | None = None) -> None:
     )
     parser.add_argument("--yaw", type=float, default=YAW, help="of the launcher [rad]")
     given = vars(parser.parse_args(arguments))
+    zmq = needed("zmq", "zeromq", "the ball launcher", package="o80-devices")
     address, restart, tracking = given.pop("address"), given.pop("restart"), given.pop("tracking")
     place, yaw = given.pop("place"), given.pop("yaw")
     with contextlib.ExitStack() as stack:
@@ -263,7 +264,7 @@ def main(arguments: list[str] | None = None) -> None:
             balls = LaunchedBalls(place, yaw, noise=TRACKING_NOISE, seed=given["seed"])
             try:
                 on_launch = stack.enter_context(TrackedLauncher(tracking, balls)).launched
-            except zeromq.required().ZMQError as error:
+            except zmq.ZMQError as error:
                 parser.error(f"the address {tracking} cannot be used: {error}")
         fake = FakeLauncher(
             Behaviour(**given), on_launch=on_launch, say=lambda text: print(text, flush=True)
@@ -272,7 +273,7 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"fake ball launcher at {address}; Ctrl-C ends it", flush=True)
         try:
             serve(fake, address, restart)
-        except zeromq.required().ZMQError as error:
+        except zmq.ZMQError as error:
             parser.error(f"the address {address} cannot be used: {error}")
         except KeyboardInterrupt:
             pass

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from o80.base.extras import needed
 from o80.base.screen import keep_printing
-from o80_devices import zeromq
 from o80_devices.ball_tracking.robot_and_ball import RobotAndBall
 from o80_devices.ball_tracking.server_messages import Message
 from o80_devices.cameras.rig import four_cameras
@@ -31,7 +31,7 @@ class FakeTrackingServer:
 
     def __init__(self, address: str) -> None:
         """address: port 0 takes any free one."""
-        zmq = zeromq.required()
+        zmq = needed("zmq", "zeromq", "a tracking server", package="o80-devices")
         self._context = zmq.Context()
         self._socket: Any = self._context.socket(zmq.PUB)
         self._socket.setsockopt(zmq.LINGER, 0)
@@ -86,10 +86,11 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--pause", type=numbers.not_negative, default=2.0, help="for how long [s]")
     parser.add_argument("--seed", type=numbers.count, default=0)
     given = parser.parse_args(arguments)
+    zmq = needed("zmq", "zeromq", "a tracking server", package="o80-devices")
     messages = recorded(given.recording) if given.recording else thrown(given.seed, given.noise)
     try:
         server = FakeTrackingServer(given.address)
-    except zeromq.required().ZMQError as error:
+    except zmq.ZMQError as error:
         parser.error(f"the address {given.address} cannot be used: {error}")
     print(f"fake tracking server at {server.address}; Ctrl-C ends it", flush=True)
     rng, start = np.random.default_rng(given.seed), time.monotonic_ns()
