@@ -3,13 +3,12 @@
 import math
 import socket
 import struct
-import threading
 import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from device_rows import WAIT, row_where
+from device_rows import WAIT, answering, row_where
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -126,37 +125,10 @@ def test_settings_of_any_text_are_names_or_an_error(settings: str) -> None:
 # ---------------------------------------------------------------------- servers
 
 
-class Answers:
-    """A server of TCP that sends what it is told to, and then reads."""
-
-    def __init__(self, *content: bytes) -> None:
-        self._content = content
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.port: int = self._listener.getsockname()[1]
-        self._thread = threading.Thread(target=self._run)
-
-    def __enter__(self) -> int:
-        self._thread.start()
-        return self.port
-
-    def __exit__(self, *_: object) -> None:
-        self._listener.close()
-        self._thread.join()
-
-    def _run(self) -> None:
-        connected, _ = self._listener.accept()
-        with connected:
-            for each in self._content:
-                connected.sendall(each)
-            connected.settimeout(WAIT)
-            while connected.recv(1 << 16):
-                pass
-
-
 def test_a_server_of_another_version_is_told() -> None:
     refusal = text(Type.ERROR, "Version NOT supported")
     with (
-        Answers(text(Type.COMMAND, GREETING), refusal) as port,
+        answering(text(Type.COMMAND, GREETING), refusal) as port,
         pytest.raises(ValueError, match="the server says: Version NOT supported"),
     ):
         QualisysConnection("127.0.0.1", port)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from device_rows import WAIT, row_where
+from device_rows import WAIT, answering, row_where
 
 import o80
 from o80_devices.fakes.qualisys import FakeQualisys
@@ -235,15 +235,11 @@ def test_a_server_that_refuses_is_told_on_the_standard_error(
 
 
 def test_a_foreign_server_is_told(segment: str) -> None:
-    from threading import Thread
-
-    listener = socket.create_server(("127.0.0.1", 0))
-    thread = Thread(target=lambda: listener.accept()[0].sendall(b"HTTP/1.1 400 no\r\n\r\n"))
-    thread.start()
-    with pytest.raises(o80.DriverError, match="is this the little-endian port 22223"):
-        ROBOT.inline(segment, port=listener.getsockname()[1])
-    thread.join()
-    listener.close()
+    with (
+        answering(b"HTTP/1.1 400 no\r\n\r\n") as port,
+        pytest.raises(o80.DriverError, match="is this the little-endian port 22223"),
+    ):
+        ROBOT.inline(segment, port=port)
 
 
 def test_in_real_time_a_row_is_a_frame(server: FakeQualisys, segment: str) -> None:

@@ -223,35 +223,21 @@ def serve(fake: FakeLauncher, address: str, restart: float) -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    import argparse
-
     usual = Behaviour()
-    parser = argparse.ArgumentParser(
-        prog="python -m o80_devices.fakes.ball_launcher", description="A fake ball launcher."
+    parser = numbers.parser(
+        "ball_launcher",
+        address=(str, "tcp://127.0.0.1:5555", "where it listens"),
+        state_time=(numbers.not_negative, usual.state_time, "of a change of state [s]"),
+        launch_time=(numbers.not_negative, usual.launch_time, "of a launch [s]"),
+        magazine=(numbers.count, usual.magazine, "balls in it"),
+        refuse=(numbers.share, usual.refuse, "share of requests that fail"),
+        crash_at=(numbers.count, usual.crash_at, "dies in the middle of this launch"),
+        restart=(float, -1.0, "after a crash [s]; -1: never"),
+        seed=(numbers.count, usual.seed, "of the scatter of launches"),
+        tracking=(str, "", "address at which the balls are published as tracked"),
+        place=(numbers.vector, PLACE, "of the launcher in the world [m]"),
+        yaw=(float, YAW, "of the launcher [rad]"),
     )
-    parser.add_argument("--address", default="tcp://127.0.0.1:5555", help="where it listens")
-    parser.add_argument(
-        "--state-time", type=numbers.not_negative, default=usual.state_time, help="[s]"
-    )
-    parser.add_argument(
-        "--launch-time", type=numbers.not_negative, default=usual.launch_time, help="[s]"
-    )
-    parser.add_argument("--magazine", type=numbers.count, default=100, help="balls in it")
-    parser.add_argument(
-        "--refuse", type=numbers.share, default=0.0, help="share of requests that fail"
-    )
-    parser.add_argument(
-        "--crash-at", type=numbers.count, default=0, help="dies in the middle of this launch"
-    )
-    parser.add_argument("--restart", type=float, default=-1.0, help="after a crash [s]; -1: never")
-    parser.add_argument("--seed", type=numbers.count, default=0)
-    parser.add_argument(
-        "--tracking", default="", help="address at which the balls are published as tracked"
-    )
-    parser.add_argument(
-        "--place", type=numbers.vector, default=PLACE, help="of the launcher in the world [m]"
-    )
-    parser.add_argument("--yaw", type=float, default=YAW, help="of the launcher [rad]")
     given = vars(parser.parse_args(arguments))
     zmq = needed("zmq", "zeromq", "the ball launcher", package="o80-devices")
     address, restart, tracking = given.pop("address"), given.pop("restart"), given.pop("tracking")

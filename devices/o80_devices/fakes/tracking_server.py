@@ -66,25 +66,17 @@ def recorded(path: Path) -> Iterator[tuple[int, Message]]:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    import argparse
-
-    parser = argparse.ArgumentParser(
-        prog="python -m o80_devices.fakes.tracking_server", description="A fake tracking server."
+    parser = numbers.parser(
+        "tracking_server",
+        address=(str, "tcp://127.0.0.1:7660", "where it publishes"),
+        recording=(Path, None, "file of a robot and a ball to play"),
+        noise=(numbers.not_negative, 0.003, "of thrown balls [m]"),
+        lose=(numbers.share, 0.0, "share of messages that are lost"),
+        clock=(numbers.not_negative, 1e9, "its clock at the start [s]"),
+        pause_at=(float, -1.0, "when it makes a pause [s]"),
+        pause=(numbers.not_negative, 2.0, "for how long [s]"),
+        seed=(numbers.count, 0, "of the throws and losses"),
     )
-    parser.add_argument("--address", default="tcp://127.0.0.1:7660", help="where it publishes")
-    parser.add_argument("--recording", type=Path, help="file of a robot and a ball to play")
-    parser.add_argument(
-        "--noise", type=numbers.not_negative, default=0.003, help="of thrown balls [m]"
-    )
-    parser.add_argument(
-        "--lose", type=numbers.share, default=0.0, help="share of messages that are lost"
-    )
-    parser.add_argument(
-        "--clock", type=numbers.not_negative, default=1e9, help="its clock at the start [s]"
-    )
-    parser.add_argument("--pause-at", type=float, default=-1.0, help="when it makes a pause [s]")
-    parser.add_argument("--pause", type=numbers.not_negative, default=2.0, help="for how long [s]")
-    parser.add_argument("--seed", type=numbers.count, default=0)
     given = parser.parse_args(arguments)
     zmq = needed("zmq", "zeromq", "a tracking server", package="o80-devices")
     messages = recorded(given.recording) if given.recording else thrown(given.seed, given.noise)

@@ -64,7 +64,7 @@ Camera camera(const std::array<double, 2>& size, const std::array<double, 2>& fo
   if (!(size[0] >= 1) || !(size[1] >= 1) || !(focal[0] > 0) || !(focal[1] > 0)) {
     throw nb::value_error("the size and the focal lengths of a camera must be positive");
   }
-  Camera made{size, focal, centre, distortion, {rotation}, {translation}};
+  Camera made{focal, centre, distortion, {rotation}, {translation}};
   const Matrix<3, 3> unit = made.rotation * transposed(made.rotation);
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
@@ -106,13 +106,12 @@ BlobFinder blob_finder(const Table& table) {
 }
 
 Doubles find(BlobFinder& finder, const Bytes& image, std::optional<std::array<int, 4>> region,
-             int step, int threshold, double min_area, double max_area) {
+             int step, double min_area) {
   constexpr std::size_t kLargest = 1 << 14;
   if (image.shape(0) > kLargest || image.shape(1) > kLargest) {
     throw nb::value_error("an image can have at most 16384 rows and columns");
   }
   if (step < 1 || step > 64) throw nb::value_error("step must be from 1 to 64");
-  if (threshold < 1 || threshold > 255) throw nb::value_error("threshold must be from 1 to 255");
   const Image seen{image.data(), static_cast<int>(image.shape(1)),
                    static_cast<int>(image.shape(0))};
   const Region where = region ? Region{(*region)[0], (*region)[1], (*region)[2], (*region)[3]}
@@ -120,7 +119,7 @@ Doubles find(BlobFinder& finder, const Bytes& image, std::optional<std::array<in
   Blobs blobs;
   {
     const nb::gil_scoped_release released;
-    blobs = finder.find(seen, where, {step, threshold, min_area, max_area});
+    blobs = finder.find(seen, where, {.step = step, .min_area = min_area});
   }
   double* values = nullptr;
   Doubles made = array({static_cast<std::size_t>(blobs.count), 5}, values);
@@ -137,7 +136,7 @@ Doubles find(BlobFinder& finder, const Bytes& image, std::optional<std::array<in
 
 std::optional<std::tuple<Doubles, Doubles, std::uint64_t, double>> locate_ball(
     const std::vector<Camera>& cameras, const Sightings& sightings, double tolerance, double noise,
-    double radius, double size_factor, int least, const std::optional<Place>& expected) {
+    double radius, int least, const std::optional<Place>& expected) {
   if (cameras.size() > kMaxCameras) throw nb::value_error("there can be at most 16 cameras");
   std::vector<Sighting> list;
   for (std::size_t i = 0; i < std::min(sightings.shape(0), kMaxSightings); ++i) {
@@ -147,7 +146,7 @@ std::optional<std::tuple<Doubles, Doubles, std::uint64_t, double>> locate_ball(
     }
     list.push_back({static_cast<int>(camera), {sightings(i, 1), sightings(i, 2)}, sightings(i, 3)});
   }
-  ConsensusRule rule{tolerance, noise, radius, size_factor, least, std::nullopt};
+  ConsensusRule rule{tolerance, noise, radius, least, std::nullopt};
   if (expected) rule.expected = vector(*expected);
   const std::optional<Located> found = locate(cameras, list, rule);
   if (!found) return std::nullopt;
@@ -183,12 +182,10 @@ NB_MODULE(_vision, module) {
           "__init__",
           [](BlobFinder* self, const Table& table) { new (self) BlobFinder(blob_finder(table)); },
           "table"_a, "table: (32768,) probabilities, 0 to 255, by 5 bits of red, green, blue.")
-      .def("find", &find, "image"_a, "region"_a = nb::none(), "step"_a = 1, "threshold"_a = 96,
-           "min_area"_a = 6.0, "max_area"_a = 1e9,
+      .def("find", &find, "image"_a, "region"_a = nb::none(), "step"_a = 1, "min_area"_a = 6.0,
            "(n, 5): x, y [px], area [px^2], weight, 1 if the region cuts it; the largest first.");
   module.def("locate", &locate_ball, "cameras"_a, "sightings"_a, "tolerance"_a = 3.0,
-             "noise"_a = 0.3, "radius"_a = 0.02, "size_factor"_a = 4.0, "least"_a = 2,
-             "expected"_a = nb::none(),
+             "noise"_a = 0.3, "radius"_a = 0.02, "least"_a = 2, "expected"_a = nb::none(),
              "sightings (n, 4): camera, x, y, area => point, covariance, cameras as bits, residual "
              "[px] of the largest consistent subset; None: no cameras agree.");
 }
