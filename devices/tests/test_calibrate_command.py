@@ -133,7 +133,8 @@ def test_the_rig_is_written_and_its_errors_are_told(
 ) -> None:
     files.place()
     output = capsys.readouterr().out
-    assert 0.2 < number_after("held out:", output) < 0.6  # 0.3 px of noise in x and in y
+    for moments in ("fitted:", "held out:"):  # 0.3 px of noise in x and in y
+        assert 0.2 < number_after(moments, output) < 0.4
     assert number_after("without one of its cameras:", output) < 5.0
     assert number_after("placed by the other three:", output) < 10.0
     assert "0 of 40 held-out moments do not fit" in output
