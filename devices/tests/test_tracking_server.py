@@ -58,6 +58,10 @@ def test_a_message_is_read_as_it_was_sent() -> None:
         b'{"time": 5, "obs": [1, 2, 1' + b"0" * 400 + b"]}",  # larger than any float
         b'{"time": 5, "obs": [1, 2, "3"]}',
         b"[" * 100_000,
+        b'{"time": ' + b"9" * 5000 + b', "obs": null}',
+        b'{"time": 1, "obs": [1e999, 0, 0]}',
+        b'{"time": 1, "obs": [true, 0, 0]}',
+        '{"time": 1, "obs": "\ud83d"}'.encode("utf-16", "surrogatepass"),
     ],
 )
 def test_a_message_that_is_none_is_marked_and_the_next_one_is_taken(content: bytes) -> None:
