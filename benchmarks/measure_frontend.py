@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80
-from sampling import built, rounds, sample, seconds, take_priority
+from sampling import BUILT, rounds, sample, seconds, take_priority
 
 ROWS = 10_000
 CALLS = 2000
@@ -78,7 +78,7 @@ def main() -> None:
     for _ in range(min(rounds(), 7)):
         start_robot()
     two = o80.robots.load("two_joints").start(bursting=True)
-    eight = o80.robots.load(str(built() / "lib" / "o80" / "robots" / "eight_empty.so")).start(
+    eight = o80.robots.load(str(BUILT / "lib" / "o80" / "robots" / "eight_empty.so")).start(
         bursting=True
     )
     targets = np.random.default_rng(1).random((ROWS, 8))

@@ -4,7 +4,7 @@ import os
 import subprocess
 
 import o80
-from sampling import built, rounds, sample
+from sampling import BUILT, rounds, sample
 
 PRIORITY = 80
 PERIODS = 1000  # in each round
@@ -29,7 +29,7 @@ def main() -> None:
     processor = max(os.sched_getaffinity(0))
     segment = f"bench-jitter-{os.getpid()}"
     command = [
-        str(built() / "bin/o80-run"), "two_joints", "--segment", segment, "--frequency", "1000",
+        str(BUILT / "bin/o80-run"), "two_joints", "--segment", segment, "--frequency", "1000",
         "--policy", "fifo", "--priority", str(PRIORITY), "--cpus", str(processor),
         "--lock-memory", "--until-eof",
     ]  # fmt: skip

@@ -65,13 +65,12 @@ def measure_recorder(count: int, folder: Path) -> int:
         rows, begin = recorder.rows, time.process_time()
         poll_for(recorder, SECONDS)
         used, rows = time.process_time() - begin, recorder.rows - rows
-        missed, size = recorder.missed, recorder.size
+        missed = recorder.missed
         recorder.finish()
         publisher.stdin.close()
     (folder / f"{count}.mcap").unlink()
     # a busy machine publishes less: as if there had been 1000 rows a second
     sample(f"recording_{count}", "%", 100 * used * (count / PERIOD) / rows)
-    sample(f"recording_{count}_bytes", "B/row", size / max(1, recorder.rows))
     return missed
 
 

@@ -29,6 +29,7 @@ from statistics import median, quantiles
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
+BUILT = ROOT / "build" / "release"
 PAGE = ROOT / "docs" / "results" / "benchmarks.md"
 RESULTS = ROOT / "build" / "bench" / "results.json"
 LONGEST = 300  # of one program [s]
@@ -62,20 +63,20 @@ class NotMeasuredError(Exception):
     """Why a program gave no figures."""
 
 
-def command_of(program: str, rounds: int, built: Path) -> list[str]:
+def command_of(program: str, rounds: int) -> list[str]:
     """Command that runs the program of a row."""
     python = ROOT / "benchmarks" / f"measure_{program.replace('-', '_')}.py"
     if python.exists():
-        return [sys.executable, str(python), str(rounds), str(built)]
-    compiled = built / "bin" / f"o80-bench-{program}"
+        return [sys.executable, str(python), str(rounds)]
+    compiled = BUILT / "bin" / f"o80-bench-{program}"
     if not compiled.exists():
         raise NotMeasuredError(f"{compiled.name} is not built")
     return [str(compiled), str(rounds)]
 
 
-def run(program: str, rounds: int, built: Path) -> Samples:
+def run(program: str, rounds: int) -> Samples:
     """Runs a program to its end. Raises NotMeasuredError."""
-    command = command_of(program, rounds, built)
+    command = command_of(program, rounds)
     try:
         ended = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST)
     except subprocess.TimeoutExpired:
@@ -95,16 +96,16 @@ def run(program: str, rounds: int, built: Path) -> Samples:
     return samples
 
 
-def measure(rows: Sequence[Row], rounds: int, built: Path) -> list[Result]:
+def measure(rows: Sequence[Row], rounds: int) -> list[Result]:
     """Runs the programs of these rows; after each its plain loops, which scale its limits."""
     measured: dict[str, Samples | str] = {}
     for program in dict.fromkeys(row["program"] for row in rows):
         print(f"measuring: {program}", file=sys.stderr)
         plain = {row["plain"] for row in rows if row["program"] == program and row["plain"]}
         try:
-            samples = run(program, rounds, built)
+            samples = run(program, rounds)
             for name in sorted(plain):
-                samples |= run(name.replace("_", "-"), ROUNDS, built)
+                samples |= run(name.replace("_", "-"), ROUNDS)
             measured[program] = samples
         except NotMeasuredError as reason:
             measured[program] = str(reason)
@@ -199,17 +200,14 @@ def main() -> None:
     every = "only these: " + ", ".join(names)
     option("--rows", nargs="+", choices=names, default=names, metavar="ROW", help=every)
     option("--quick", action="store_true", help="few repetitions: rough figures")
-    option("--rounds", type=int, help=f"repetitions of each (default: {ROUNDS})")
-    built = ROOT / "build" / "release"
-    option("--built", type=Path, default=built, help="folder of the programs (build/release)")
     option("--page", action="store_true", help=f"write {PAGE.relative_to(ROOT)}, too: of all rows")
     given = parser.parse_args()
     if given.page and (given.rows != names or given.quick):
         parser.error("--page is for a run of all rows: without --rows and --quick")
-    rounds = given.rounds or (ROUNDS_QUICK if given.quick else ROUNDS)
+    rounds = ROUNDS_QUICK if given.quick else ROUNDS
     where = conditions()
     chosen = [row for row in rows if row["name"] in given.rows]
-    results = measure(chosen, rounds, given.built.resolve())
+    results = measure(chosen, rounds)
     RESULTS.parent.mkdir(parents=True, exist_ok=True)
     RESULTS.write_text(json.dumps(results, indent=2) + "\n")
     page = page_of(results, where)

@@ -6,6 +6,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+BUILT = Path(__file__).resolve().parent.parent / "build" / "release"
+"""Folder of the built programs and robots."""
+
 
 def take_priority() -> None:
     """Takes real-time priority for short measurements, where permitted.
@@ -31,8 +34,3 @@ def seconds(call: Callable[[], object]) -> float:
 
 def rounds() -> int:
     return int(sys.argv[1])
-
-
-def built() -> Path:
-    """Returns the folder of the built programs and robots."""
-    return Path(sys.argv[2])

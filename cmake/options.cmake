@@ -14,6 +14,7 @@ option(O80_BUILD_EXAMPLES "Build the C++ examples" OFF)
 option(O80_BUILD_BENCHMARKS "Build the benchmarks" OFF)
 option(O80_WERROR "Treat warnings as errors" OFF)
 option(O80_CCACHE "Compile through ccache where it is installed" OFF)
+option(O80_TIDY "Check all compiled sources with clang-tidy" OFF)
 option(O80_STATIC "Link everything statically; such programs load no robot libraries" OFF)
 set(O80_TEST_FOLDERS "" CACHE STRING "Folders of tests/cpp to build; empty: all that can be built")
 set(O80_BUILD_MUJOCO "AUTO" CACHE STRING "Build the MuJoCo simulator: AUTO (if MuJoCo is found), ON or OFF")
@@ -39,4 +40,20 @@ set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 if(O80_SANITIZE)
   add_compile_options(-fsanitize=${O80_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${O80_SANITIZE})
+endif()
+
+# a source is checked when it is compiled: again only after a change of what it includes, of the
+# settings or of clang-tidy
+if(O80_TIDY)
+  execute_process(
+    COMMAND clang-tidy --version OUTPUT_VARIABLE tidy_version COMMAND_ERROR_IS_FATAL ANY
+  )
+  file(READ ${PROJECT_SOURCE_DIR}/.clang-tidy tidy_settings)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/.clang-tidy)
+  string(SHA256 tidy_state "${tidy_version} ${tidy_settings}")
+  # the static analyzer also checks included headers; it finds most within few nodes
+  set(CMAKE_CXX_CLANG_TIDY clang-tidy --quiet --extra-arg=-DO80_TIDY_STATE=${tidy_state})
+  foreach(option IN ITEMS -analyzer-opt-analyze-headers -analyzer-config max-nodes=30000)
+    list(APPEND CMAKE_CXX_CLANG_TIDY --extra-arg=-Xclang --extra-arg=${option})
+  endforeach()
 endif()

@@ -127,7 +127,6 @@ foreach(folder IN LISTS test_folders)
     add_test(
       NAME ${folder}
       COMMAND ${target} --gtest_brief=1 "--gtest_filter=-${elsewhere}"
-              "--gtest_output=xml:${PROJECT_BINARY_DIR}/reports/${folder}.xml"
     )
     set_tests_properties(${folder} PROPERTIES TIMEOUT 900)
   else()

@@ -53,7 +53,7 @@ STEPS: dict[str, list[list[str]]] = {
         *build("dev", "o80-torture"),
         ["build/dev/bin/o80-torture", *TORTURE, "--python", sys.executable],
     ],
-    "tidy": [["cmake", "--preset", "dev"], [sys.executable, "tools/tidy.py"]],
+    "tidy": build("tidy"),
     "models": [[*PROOF, "models", "--no-mutants"]],
     "asan": [*build("asan"), ctest("asan", "asan")],
     "tsan": [*build("tsan"), ctest("tsan", "tsan")],
@@ -72,7 +72,8 @@ CHAINS = (
     ("lerobot",),
     ("models",),
     ("tsan",),
-    ("cpp", "torture", "tidy"),
+    ("tidy",),
+    ("cpp", "torture"),
     ("mypy",),
     ("arm64",),
 )
@@ -98,9 +99,6 @@ def outcomes(names: list[str]) -> Outcomes:
     found = Outcomes()
     for name in ("test_cpp", "test_python", *names):
         if (report := LOGS / f"{name}.xml").exists():
-            found.read_report(report)
-    for preset in {"asan", "tsan"} & set(names):
-        for report in (ROOT / "build" / preset / "reports").glob("*.xml"):
             found.read_report(report)
     if "rt" in names and not found.read_log("rt", LOGS / "rt.log"):
         found.passed |= set((ROOT / "build/rt/machine/passed").read_text().split())

@@ -1,7 +1,6 @@
-"""Reads reports of test runners: passed, failed and skipped tests, with reasons of skips.
+"""Reads reports of ctest and pytest: passed, failed and skipped tests, with reasons of skips.
 
-ctest and the real-time machine both name a test `folder.Suite.Test`: a test that is skipped in
-one build and passes in another one has the same name in both.
+The real-time machine names a test `folder.Suite.Test`, as ctest does.
 """
 
 import re
@@ -18,21 +17,15 @@ class Outcomes:
         self.failed: list[str] = []
 
     def read_report(self, file: Path) -> None:
-        """Adds a report of ctest, of pytest, or of a C++ test program with the report's name."""
+        """Adds a report of ctest or pytest."""
         for case in ET.parse(file).getroot().iter("testcase"):
+            of_ctest = "status" in case.attrib
             name = case.get("name", "")
-            of_ctest, of_program = case.get("status"), case.get("result")
-            if of_program or not of_ctest:
-                name = f"{case.get('classname')}.{name}"
-            if of_program:
-                name = f"{file.stem}.{name}"
+            name = name if of_ctest else f"{case.get('classname')}.{name}"
             skipped = case.find("skipped")
             if skipped is not None:
-                reason = skipped.get("message", "")
-                if of_program:
-                    reason = " ".join(reason.split()[1:])  # drops file and line
-                elif of_ctest:
-                    reason = _googletest_reason(case.findtext("system-out") or "")
+                printed = case.findtext("system-out") or ""
+                reason = _googletest_reason(printed) if of_ctest else skipped.get("message", "")
                 self.skipped[name] = reason
             elif all(case.find(kind) is None for kind in ("failure", "error")):
                 self.passed.add(name)

@@ -25,10 +25,6 @@ LEROBOT = "gateways/lerobot"
 SUITE = re.compile(r"^(?:TYPED_)?TEST(?:_F|_P)?\((\w+),", re.MULTILINE)
 
 
-class NoSuchTestsError(Exception):
-    """A word names no tests."""
-
-
 @dataclass
 class Selection:
     """Chosen C++ suites by folder, and paths for pytest; `lerobot`: for LeRobot's Python."""
@@ -69,7 +65,10 @@ class Selection:
 
 
 def select(words: Iterable[str]) -> Selection:
-    """Selects folders by name, folders and files by path, single tests by pytest's names."""
+    """Selects folders by name, folders and files by path, single tests by pytest's names.
+
+    Raises ValueError for a word that names no tests.
+    """
     chosen = Selection()
     for word in words:
         path = (ROOT / word.partition("::")[0]).resolve()
@@ -78,5 +77,5 @@ def select(words: Iterable[str]) -> Selection:
         if not any(found):
             near = difflib.get_close_matches(word, NAMED, 1)
             hint = f", did you mean '{near[0]}'?" if near else "; --help lists what does"
-            raise NoSuchTestsError(f"'{word}' names no tests{hint}")
+            raise ValueError(f"'{word}' names no tests{hint}")
     return chosen

@@ -8,6 +8,7 @@ import argparse
 import contextlib
 import os
 import random
+import shlex
 import shutil
 import signal
 import subprocess
@@ -15,13 +16,14 @@ import sys
 import tempfile
 import threading
 import time
+import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from outcomes import Outcomes
 from sources import ROOT
-from steps import JOBS, PYTHON, Step, build, ctest, pytest, run, use_tools
+from steps import JOBS, Step, build, ctest, pytest, run, use_tools
 
 FOLDER = ROOT / "build" / "soak"
 GROUPS = Path("/sys/fs/cgroup")
@@ -218,40 +220,30 @@ def available() -> list[str]:
     return [name for name in CONDITIONS if not lacking.get(name, False)]
 
 
-def python_files(mark: str) -> list[str]:
-    """Lists the files with tests of this mark."""
-    listed = subprocess.run(
-        [*PYTHON, "pytest", "--collect-only", "-qq", "-m", mark],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    lines = (line.partition(":")[0] for line in listed.stdout.splitlines())
-    return sorted({line for line in lines if line.endswith(".py") and (ROOT / line).exists()})
+def python_files() -> list[str]:
+    """Lists the files that pytest reads by itself, in a fixed order."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]
+    folders = settings["ini_options"]["testpaths"]
+    return sorted(str(file) for each in folders for file in (ROOT / each).rglob("test_*.py"))
 
 
 def commands_of(this: Round, chosen: argparse.Namespace) -> dict[str, list[str]]:
     """Builds the commands of the runners, by name."""
-    mark = "check" if chosen.check else "not check"
-    labels = ["-L" if chosen.check else "-LE", "^check$"]
-    cpp = ctest(str(this.folder / "cpp"), "dev", *labels)
-    if chosen.cpp:
-        cpp += ["-R", chosen.cpp]
+    cpp = ctest(str(this.folder / "cpp"), "dev", *shlex.split(chosen.ctest or "-LE '^check$'"))
     one_of = max(1, round(1.0 / chosen.share))
     if one_of > 1:
         cpp += ["-I", f"{this.random.randint(1, one_of)},,{one_of}"]
-    python = pytest(str(this.folder / "python"), "-m", mark)
-    files = list(chosen.python)
-    if not files and (this.shuffled or one_of > 1):
-        files = python_files(mark)
-        files = sorted(this.random.sample(files, max(1, len(files) // one_of)))
+    options = shlex.split(chosen.pytest or "-m 'not check'")
+    python = pytest(str(this.folder / "python"), *options)
     if this.shuffled:
         cpp += ["--schedule-random"]
-        this.random.shuffle(files)
-    runners = {"cpp": cpp, "python": [*python, *files]}
-    if bool(chosen.cpp) != bool(chosen.python):  # runs only the named tests
-        del runners["python" if chosen.cpp else "cpp"]
+    if not chosen.pytest and (this.shuffled or one_of > 1):
+        files = python_files()
+        files = this.random.sample(files, max(1, len(files) // one_of))
+        python += files if this.shuffled else sorted(files)
+    runners = {"cpp": cpp, "python": python}
+    if bool(chosen.ctest) != bool(chosen.pytest):  # runs only the chosen tests
+        del runners["python" if chosen.ctest else "cpp"]
     return {name: [*this.prefix, *command] for name, command in runners.items()}
 
 
@@ -289,9 +281,8 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=int(time.time()))
     parser.add_argument("--first", type=int, default=0, help="number of the first round")
     parser.add_argument("--conditions", nargs="+", choices=CONDITIONS, help="all of these at once")
-    parser.add_argument("--cpp", metavar="PATTERN", help="tests in C++ whose name matches")
-    parser.add_argument("--python", nargs="+", default=[], metavar="FILE", help="tests in Python")
-    parser.add_argument("--check", action="store_true", help="the tests that `make check` adds")
+    parser.add_argument("--ctest", default="", help="options of ctest that choose tests in C++")
+    parser.add_argument("--pytest", default="", help="files and options of pytest")
     parser.add_argument("--share", type=float, default=1.0, help="part of the tests in each round")
     chosen = parser.parse_args()
     if not 0.0 < chosen.share <= 1.0:

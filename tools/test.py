@@ -9,7 +9,7 @@ import subprocess
 import sys
 
 from outcomes import Outcomes
-from selection import LEROBOT, NAMED, NoSuchTestsError, Selection, select
+from selection import LEROBOT, NAMED, Selection, select
 from sources import ROOT, all_left_to_check
 from steps import (
     LOGS,
@@ -81,9 +81,8 @@ def main() -> int:
     try:
         words = arguments.tests or [name for name in NAMED if name != "lerobot"]
         chosen = select([] if everything else words)
-    except NoSuchTestsError as error:
-        print(error, file=sys.stderr)
-        return 2
+    except ValueError as error:
+        parser.error(str(error))
     if not set_up(chosen, everything=everything):
         return 1
     commands, tests = all_steps() if everything else some_steps(chosen, arguments.keyword)

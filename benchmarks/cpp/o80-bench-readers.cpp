@@ -115,10 +115,6 @@ void measure(int rounds) {
   backend.publish({}, {});
   nap(200'000'000);
   for (int round = 0; round < rounds; ++round) {
-    waiters.stand_still();
-    paced_iteration(backend, 2);
-    sample("paced_writer_alone", "us", paced_iteration(backend, 50) * 1e-3);
-    waiters.go_on();
     sample("paced_writer_with_64_waiters", "us", paced_iteration(backend, 50) * 1e-3);
   }
 }

@@ -4,6 +4,7 @@ import contextlib
 import os
 import signal
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ import pytest
 
 import o80
 from o80.drivers import Reading
-from o80_devices.ball_tracking import BallTracker, Reason, SyntheticCameras, four_cameras
+from o80_devices.ball_tracking import BallTracker, Reason, Rig, SyntheticCameras, four_cameras
+from o80_devices.cameras.flight import Flight, Table
 
 RATE = 180
 
@@ -135,7 +137,7 @@ def test_the_rig_is_written_and_read(tmp_path: Path) -> None:
     path = tmp_path / "rig.json"
     rig = four_cameras()
     rig.save(path)
-    assert type(rig).load(path) == rig
+    assert Rig.load(path) == rig
 
 
 @pytest.mark.parametrize(
@@ -151,4 +153,18 @@ def test_a_wrong_rig_is_refused_with_its_fault(tmp_path: Path, text: str, wrong:
     path = tmp_path / "rig.json"
     path.write_text(text)
     with pytest.raises(o80.InvalidArgument, match=wrong):
-        type(four_cameras()).load(path)
+        Rig.load(path)
+
+
+@pytest.mark.parametrize(
+    ("part", "wrong"),
+    [
+        ({"flight": Flight(drag=np.nan)}, "drag must be a finite number"),
+        ({"flight": Flight(gravity=(0.0, 9.81, 0.0))}, "gravity must point along z"),
+        ({"table": Table(half=(-1.0, 1.0))}, "low must be less than high"),
+        ({"table": Table(friction="much")}, "is not a number"),  # type: ignore[arg-type]
+    ],
+)
+def test_a_rig_without_a_law_of_flight_is_refused(part: dict[str, Any], wrong: str) -> None:
+    with pytest.raises(ValueError, match=wrong):
+        replace(four_cameras(), **part).check()

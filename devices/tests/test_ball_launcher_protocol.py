@@ -69,14 +69,6 @@ def finished(bench: Bench) -> LastLaunch:
     return ends[0][0]
 
 
-def test_a_launch_is_completed_when_the_launcher_says_so(make: Make) -> None:
-    bench = make()
-    bench.client.ask(bench.now)
-    assert finished(bench) is LastLaunch.completed
-    assert len(bench.fake.launches) == 1
-    assert bench.status is Status.ready
-
-
 def test_the_launcher_has_the_wanted_state_before_it_launches(make: Make) -> None:
     bench = make()
     bench.wanted = State(0.4, 0.6, 0.35, 0.35, 0.3)
@@ -87,16 +79,6 @@ def test_the_launcher_has_the_wanted_state_before_it_launches(make: Make) -> Non
         Kind.SET_STATE,
         Kind.LAUNCH_BALL,
     ]
-
-
-def test_an_empty_magazine_rejects_the_launch(make: Make) -> None:
-    bench = make(Behaviour(state_time=0.0, launch_time=0.1, magazine=1))
-    ends = []
-    for _ in range(2):
-        bench.client.ask(bench.now)
-        ends.append(finished(bench))
-    assert ends == [LastLaunch.completed, LastLaunch.rejected]
-    assert bench.status is Status.ready
 
 
 def test_a_second_launch_is_refused_while_one_is_under_way(make: Make) -> None:

@@ -170,7 +170,8 @@ def test_a_hit_keeps_the_number_and_another_place_gets_another() -> None:
         tracked = tracker.place(sightings(ball, random, 0.2), round(time * 1e9))
         numbers.append(tracked.ball)
         reasons.append(tracked.reason)
-        place, velocity, spin, _ = law.advance(place, velocity, spin, 1 / RATE)
+        moved, _ = law.advance(np.concatenate([place, velocity, spin]), 1 / RATE)
+        place, velocity, spin = moved.reshape(3, 3)
     assert set(numbers[:36]) == {1}
     assert set(numbers[40:72]) == {1}
     assert set(numbers[76:]) == {2}

@@ -133,7 +133,8 @@ def test_the_rig_is_written_and_its_errors_are_told(
 ) -> None:
     files.place()
     output = capsys.readouterr().out
-    assert 0.2 < number_after("held out:", output) < 0.6  # 0.3 px of noise in x and in y
+    for moments in ("fitted:", "held out:"):  # 0.3 px of noise in x and in y
+        assert 0.2 < number_after(moments, output) < 0.4
     assert number_after("without one of its cameras:", output) < 5.0
     assert number_after("placed by the other three:", output) < 10.0
     assert "0 of 40 held-out moments do not fit" in output
@@ -152,6 +153,7 @@ def marked_otherwise(order: list[int], images: list[int]) -> Callable[[Files], N
 
 
 ELSEWHERE = np.random.default_rng(1).uniform([0.3, 1.5, 1.0], [0.5, 1.7, 1.1], (160, 3))
+TOO_FEW = np.random.default_rng(1).uniform(*INSIDE, (12, 3))
 IN_A_PLANE = np.random.default_rng(1).uniform(*INSIDE, (160, 3)) * [1, 1, 0] + [0, 0, 1]
 
 
@@ -162,6 +164,7 @@ IN_A_PLANE = np.random.default_rng(1).uniform(*INSIDE, (160, 3)) * [1, 1, 0] + [
         (marked_otherwise([1, 2, 3, 0], [0, 1, 2, 3]), r"only within \d+ mm: check the order"),
         (marked_otherwise([1, 2, 3, 0], [2]), "marked at different places of the room"),
         (lambda files: files.write_wave(ELSEWHERE), "wave it through the whole space"),
+        (lambda files: files.write_wave(TOO_FEW), "see the ball together in"),
         (lambda files: files.write_wave(IN_A_PLANE), "waved in a plane"),
         (lambda files: files.wave.write_bytes(b""), "is not a recording of a waved ball"),
         (lambda files: files.wave.write_bytes(b"nothing"), "is not a recording of a waved ball"),
@@ -306,18 +309,6 @@ def cameras(segment: str) -> Iterator[str]:
         yield segment
 
 
-def test_a_waved_ball_is_recorded_from_running_cameras(files: Files, cameras: str) -> None:
-    run(
-        *("wave", "--segment", cameras, "--lenses", files.lenses),
-        *("--moments", 160, "-o", files.wave),
-    )
-    files.place()
-    points = np.random.default_rng(7).uniform(*INSIDE, (100, 3))
-    rig = Rig.load(files.rig)
-    away = np.linalg.norm(triangulated(rig.cameras, seen_by_all(points)) - points, axis=1)
-    assert np.nanmean(away) < 0.005
-
-
 def test_a_picture_of_each_camera_is_saved(files: Files, cameras: str, tmp_path: Path) -> None:
     run(
         *("pictures", "--segment", cameras, "--lenses", files.lenses),
@@ -343,7 +334,6 @@ def test_cameras_that_see_no_ball_are_told(
         run("wave", "--segment", segment, "--lenses", files.lenses, "-o", files.wave)
 
 
-@pytest.mark.check
 def test_a_rig_is_calibrated_from_pictures_and_running_cameras(
     tmp_path: Path,
     segment: str,

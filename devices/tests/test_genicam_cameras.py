@@ -79,7 +79,7 @@ def test_the_tracker_reads_its_images_with_the_error_of_their_time(segment: str)
     with ROBOT.inline(segment, frequency=1000, history=4, sources="Fake_1", rate=50) as cameras:
         source.attach(WAIT)
         row = row_where(cameras, lambda row: row.valid[0])
-        images = source.read(0.0)
+        images = source.read()
         source.close()
     assert images is not None
     (image,) = images.images

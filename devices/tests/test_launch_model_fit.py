@@ -13,7 +13,7 @@ from o80_devices.ball_launcher import LAUNCH_MODEL, LaunchModel
 from o80_devices.ball_launcher.fit import SCALES, SCATTERS, TABLE, distances, fitted, halves, main
 from o80_devices.ball_launcher.fit import scatter as scatter_of
 from o80_devices.ball_launcher.recorded_shots import recorded_shots
-from o80_devices.cameras.rig import Rig
+from o80_devices.cameras.flight import Flight, FlightLaw
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("O80_DATA", ROOT.parent / "shared" / "data")) / "spin_2022"
@@ -32,13 +32,13 @@ OTHER = LaunchModel(
 
 def write(file: Path, model: LaunchModel, settings: tuple[tuple[float, float, float], ...]) -> None:
     """A shot for each setting of the motors, seen by cameras from 30 ms after the launch on."""
-    law = Rig(cameras=(), table=TABLE).law()
+    law = FlightLaw(Flight(), TABLE)
     stamps = 100.0 + 0.0056 * np.arange(130)
     with h5py.File(file, "w") as content:
         for number, speeds in enumerate(settings):
             ball = model.launch(0.5, 0.5, speeds)
-            start = ball.position, ball.velocity, ball.spin
-            seen = [law.advance(*start, 0.03 + stamp - stamps[0])[0] for stamp in stamps]
+            start = np.concatenate([ball.position, ball.velocity, ball.spin])
+            seen = [law.advance(start, 0.03 + stamp - stamps[0])[0][:3] for stamp in stamps]
             shot = content.create_group(f"originals/{number}")
             shot["launch_param"], shot["time_stamps"] = [0.5, 0.5, *speeds], stamps
             shot["positions"] = np.array(seen)
@@ -52,6 +52,7 @@ def assert_same(one: LaunchModel, other: LaunchModel, share: float) -> None:
         assert abs(difference) < share * SCALES[name], name
 
 
+@pytest.mark.check  # needs SciPy
 @pytest.mark.recordings("spin_2022")
 def test_the_constants_of_the_model_come_from_half_of_the_recorded_shots() -> None:
     shots = recorded_shots([DATA])
@@ -66,6 +67,7 @@ def test_the_constants_of_the_model_come_from_half_of_the_recorded_shots() -> No
     np.testing.assert_allclose(scatter_of(found, shots), expected, rtol=0.2)
 
 
+@pytest.mark.check  # needs SciPy
 def test_the_fit_finds_the_numbers_of_a_known_model(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -8,7 +8,7 @@ import o80
 from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL
 from o80_devices.ball_tracking.server_messages import ServerReason
 from o80_devices.ball_tracking.tracking_server import TrackingServer
-from o80_devices.cameras.rig import Table
+from o80_devices.cameras.flight import Table
 from o80_devices.fakes.ball_launcher import PLACE, YAW
 from o80_devices.fakes.launched_balls import SECOND, LaunchedBalls, TrackedLauncher
 
@@ -27,18 +27,6 @@ def test_a_ball_flies_from_the_launcher_and_bounces_on_the_table() -> None:
     assert path[low, 2] == pytest.approx(table.middle[2] + 0.02, abs=0.03)
     assert (np.abs(path[low, :2] - table.middle[:2]) < table.half).all()
     assert path[low + 10, 2] > path[low, 2]  # it bounced
-
-
-def test_the_steps_of_time_do_not_change_the_flight() -> None:
-    places = []
-    for count in (1, 7, 90):
-        balls = LaunchedBalls(PLACE, YAW)
-        balls.launched(BALL, 0)
-        for i in range(count):
-            message = balls.message(round((i + 1) / count * 0.4 * SECOND))
-        assert message.place is not None
-        places.append(message.place)
-    assert np.ptp(places, axis=0).max() < 1e-4
 
 
 def test_a_ball_that_lies_is_not_tracked() -> None:

@@ -38,6 +38,14 @@ def played(segment: str, bursts: int = 900, **options: Any) -> o80.History:
         return rows
 
 
+def corners(segment: str, **options: Any) -> dict[str, Any]:
+    """The middle of all positions of each corner of the table [m]."""
+    rows = played(segment, subjects=",".join(CORNERS), **options).extended
+    return {
+        name: np.nanmedian(rows[name.replace(" ", "_")]["position"], axis=0) for name in CORNERS
+    }
+
+
 def test_every_row_has_poses_or_a_reason(segment: str) -> None:
     rows = played(segment, bursts=1000).extended
     seen = rows["reason"] == Reason.SEEN
@@ -77,10 +85,7 @@ def test_capture_times_are_those_of_the_system(segment: str) -> None:
 
 
 def test_the_corners_of_the_table_are_as_far_apart_as_the_table_says(segment: str) -> None:
-    rows = played(segment, subjects=",".join(CORNERS)).extended
-    middles = {
-        name: np.nanmedian(rows[name.replace(" ", "_")]["position"], axis=0) for name in CORNERS
-    }
+    middles = corners(segment)
     one, two, three, four = (middles[name] for name in CORNERS)
     for a, b in ((one, two), (three, four)):
         assert np.linalg.norm(a - b) == pytest.approx(WIDTH, abs=0.012)
@@ -91,16 +96,10 @@ def test_the_corners_of_the_table_are_as_far_apart_as_the_table_says(segment: st
 
 
 def test_poses_are_in_the_world_of_a_file(segment: str, tmp_path: Path) -> None:
-    rows = played(segment, subjects=",".join(CORNERS)).extended
-    middles = {
-        name: np.nanmedian(rows[name.replace(" ", "_")]["position"], axis=0) for name in CORNERS
-    }
     file = tmp_path / "world.json"
-    Transform.estimated(middles, TABLE).save(file)
-    moved = played(segment, subjects=",".join(CORNERS), transform=str(file)).extended
-    for name, corner in TABLE.items():
-        positions = moved[name.replace(" ", "_")]["position"]
-        assert np.nanmedian(positions, axis=0) == pytest.approx(corner, abs=0.01)
+    Transform.estimated(corners(segment), TABLE).save(file)
+    for name, middle in corners(segment, transform=str(file)).items():
+        assert middle == pytest.approx(TABLE[name], abs=0.01)
 
 
 def test_a_cut_recording_is_told(tmp_path: Path) -> None:

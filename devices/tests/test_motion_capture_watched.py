@@ -24,15 +24,6 @@ PORT = 22223
 ROBOT = o80.robots.load(Watched)
 
 
-def matrix_of_angles(roll: float, pitch: float, yaw: float) -> tuple[float, ...]:
-    """Row by row; roll about x, then pitch about the new y, then yaw about the new z [rad]."""
-    a, b, c = (np.cos(each) + 1j * np.sin(each) for each in (roll, pitch, yaw))
-    about_x = np.array([[1, 0, 0], [0, a.real, -a.imag], [0, a.imag, a.real]])
-    about_y = np.array([[b.real, 0, b.imag], [0, 1, 0], [-b.imag, 0, b.real]])
-    about_z = np.array([[c.real, -c.imag, 0], [c.imag, c.real, 0], [0, 0, 1]])
-    return tuple((about_x @ about_y @ about_z).ravel().tolist())
-
-
 def clients() -> list[int]:
     """Child processes of this one that run a client."""
     return [
@@ -167,7 +158,8 @@ def test_a_client_whose_driver_has_died_meanwhile_ends() -> None:
     assert subprocess.run(command, timeout=WAIT, check=False).returncode == 0
 
 
-TILTED = ((1.0, -2.0, 0.5), matrix_of_angles(0.3, -0.4, 1.1))
+TURN = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+TILTED = ((1.0, -2.0, 0.5), (TURN * np.linalg.det(TURN)).ravel().tolist())  # a rotation
 
 
 def test_a_pose_of_a_real_client_comes_through_the_process(segment: str) -> None:

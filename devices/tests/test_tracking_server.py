@@ -16,11 +16,11 @@ from o80_devices.ball_tracking.robot_and_ball import RobotAndBall
 from o80_devices.ball_tracking.server_messages import (
     SECOND,
     Message,
-    Place,
+    Options,
     ServerReason,
     ServerTrack,
 )
-from o80_devices.ball_tracking.tracking_server import Options, TrackingServer
+from o80_devices.ball_tracking.tracking_server import TrackingServer
 from o80_devices.cameras.rig import four_cameras
 from o80_devices.cameras.throws import Throws
 from o80_devices.fakes.tracking_server import FakeTrackingServer, thrown
@@ -58,10 +58,14 @@ def test_a_message_is_read_as_it_was_sent() -> None:
         b'{"time": 5, "obs": [1, 2, 1' + b"0" * 400 + b"]}",  # larger than any float
         b'{"time": 5, "obs": [1, 2, "3"]}',
         b"[" * 100_000,
+        b'{"time": ' + b"9" * 5000 + b', "obs": null}',
+        b'{"time": 1, "obs": [1e999, 0, 0]}',
+        b'{"time": 1, "obs": [true, 0, 0]}',
+        '{"time": 1, "obs": "\ud83d"}'.encode("utf-16", "surrogatepass"),
     ],
 )
 def test_a_message_that_is_none_is_marked_and_the_next_one_is_taken(content: bytes) -> None:
-    track = ServerTrack()
+    track = ServerTrack(Options())
     assert track.take(content, SECOND).reason is ServerReason.invalid
     good = track.take(Message(OFFSET, np.zeros(3)).encoded(), 2 * SECOND)
     assert good.reason is ServerReason.seen
@@ -84,15 +88,20 @@ def test_an_option_out_of_range_is_named(options: dict[str, Any]) -> None:
         TrackingServer(Options(**options))
 
 
-def test_a_place_is_turned_and_moved_into_the_world() -> None:
-    place = Place((1.0, 2.0, 3.0), (0.0, 0.0, math.pi / 2))
-    np.testing.assert_allclose(place.in_world(np.array([1.0, 0.0, 0.5])), [1.0, 3.0, 3.5])
-    rolled = Place(rotation=(math.pi / 2, 0.0, 0.0))
-    np.testing.assert_allclose(rolled.in_world(np.array([0.0, 1.0, 0.0])), [0, 0, 1], atol=1e-12)
+@pytest.mark.parametrize(
+    ("rotation", "expected"),
+    [((0.0, 0.0, math.pi / 2), [1.0, 3.0, 3.5]), ((math.pi / 2, 0.0, 0.0), [2.0, 1.5, 3.0])],
+)
+def test_a_place_is_turned_and_moved_into_the_world(
+    rotation: tuple[float, float, float], expected: list[float]
+) -> None:
+    track = ServerTrack(Options(translation=(1.0, 2.0, 3.0), rotation=rotation))
+    seen = track.take(Message(OFFSET, np.array([1.0, 0.0, 0.5])).encoded(), SECOND)
+    np.testing.assert_allclose(seen.ball.measured, expected)
 
 
 def test_rows_without_a_new_message_have_no_ball_and_silence_is_told() -> None:
-    track = ServerTrack(timeout=0.05)
+    track = ServerTrack(Options(timeout=0.05))
     now = 10 * SECOND
     assert track.silent(now).reason is ServerReason.silent
     message = Message(OFFSET, np.zeros(3)).encoded()
@@ -105,12 +114,12 @@ def test_rows_without_a_new_message_have_no_ball_and_silence_is_told() -> None:
 
 
 def test_no_ball_is_marked() -> None:
-    track = ServerTrack()
+    track = ServerTrack(Options())
     assert track.take(Message(OFFSET, None).encoded(), SECOND).reason is ServerReason.not_seen
 
 
 def test_a_message_that_was_held_up_is_not_used() -> None:
-    track = ServerTrack(max_age=0.1)
+    track = ServerTrack(Options(max_age=0.1))
     for frame in range(100):
         at = frame * SECOND // 180
         track.take(Message(OFFSET + at, np.zeros(3)).encoded(), SECOND + at)
@@ -120,7 +129,7 @@ def test_a_message_that_was_held_up_is_not_used() -> None:
 
 
 def test_thrown_balls_are_numbered_and_their_velocity_is_better_than_by_differences() -> None:
-    track, throws = ServerTrack(), Throws(four_cameras(), 3)
+    track, throws = ServerTrack(Options()), Throws(four_cameras(), 3)
     balls, errors, differences = set(), [], []
     before: np.ndarray | None = None
     for at, message in islice(thrown(3, 0.003), round(180 * 5.4)):
@@ -181,7 +190,7 @@ def test_a_line_that_is_no_row_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["o80_robot_ball_002", "o80_robot_ball_003"])
 def test_a_recording_is_played_as_the_tracker_would_have_sent_it(name: str) -> None:
     recording = RobotAndBall.load(RECORDED / name)
-    track = ServerTrack()
+    track = ServerTrack(Options())
     stamps, places, seen_rows = [], [], 0
     for at, message in recording.messages():
         stamps.append(message.stamp)

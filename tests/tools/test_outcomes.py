@@ -27,13 +27,6 @@ PYTEST = """<testsuites><testsuite>
   </testcase>
   <testcase classname="tests.python.test_a" name="test_fails"><failure message="x"/></testcase>
 </testsuite></testsuites>"""
-PROGRAM = """<testsuites><testsuite name="Loop">
-  <testcase name="Waits" status="run" result="completed" classname="Loop"/>
-  <testcase name="Locks" status="run" result="skipped" classname="Loop">
-    <skipped message="a/run_test.cpp:144&#x0A;no memory&#x0A;may be locked"/>
-  </testcase>
-  <testcase name="Ends" status="run" result="completed" classname="Loop"><failure/></testcase>
-</testsuite></testsuites>"""
 
 
 @pytest.fixture
@@ -52,14 +45,6 @@ def test_reports_tell_what_passed_and_why_a_test_was_skipped(found: Outcomes) ->
         "robot.RealTime.Locks": "no user may be given a real-time priority here",
         "tests.python.test_a.test_skips": "no strace",
     }
-
-
-def test_the_report_of_a_program_names_its_folder(tmp_path: Path) -> None:
-    report, found = tmp_path / "robot.xml", Outcomes()
-    report.write_text(PROGRAM)
-    found.read_report(report)
-    assert found.passed == {"robot.Loop.Waits"}
-    assert found.skipped == {"robot.Loop.Locks": "no memory may be locked"}
 
 
 def test_a_skip_is_a_gap_unless_another_run_passed_that_test(found: Outcomes) -> None:

@@ -9,9 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 import o80
+from o80.base.extras import needed
 from o80.base.screen import complain
 from o80.drivers import Desired, Reading, option
-from o80_devices import zeromq
 from o80_devices.ball_launcher.exchange import DELIVERED_WITHIN, Exchange, Outcome
 from o80_devices.ball_launcher.launcher import (
     CONFIRMATIONS,
@@ -100,7 +100,7 @@ class BallLauncher:
 
     def start(self) -> None:
         Request(Kind.LAUNCH_BALL).encoded()  # reports a missing protobuf at the start
-        self._zmq = zeromq.required()
+        self._zmq = needed("zmq", "zeromq", "the ball launcher", package="o80-devices")
         self._context = self._zmq.Context()
         config = self._config
         self._link = Link(self._zmq, self._context, config.address, config.heartbeat_timeout)

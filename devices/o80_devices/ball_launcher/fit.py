@@ -1,6 +1,6 @@
 """Fits the launch model to recorded shots: `python -m o80_devices.ball_launcher.fit FILES`.
 
-Damped least squares fits nine numbers of the model: the simulated flights, bounces included, must
+Least squares fits nine numbers of the model: the simulated flights, bounces included, must
 be as close as possible to all recorded positions. The numbers are fitted to one
 half of the shots and tested on the other half. For the scatter, each shot is then fitted alone by
 its speed, azimuth, altitude and spin.
@@ -24,10 +24,11 @@ import numpy as np
 import o80
 from o80.base.arrays import FloatArray
 from o80.base.descriptors import open_standard_streams
+from o80.base.extras import needed
 from o80.errors import InvalidArgument
 from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL, Launch, LaunchModel
 from o80_devices.ball_launcher.recorded_shots import Setting, Shot, recorded_shots
-from o80_devices.cameras.rig import Rig, Table
+from o80_devices.cameras.flight import Flight, FlightLaw, Table
 
 TABLE = Table(middle=(1.38, 0.0, 0.742), half=(1.37, 0.7625))
 """Table in the frame of the launcher; the height is read from the recorded bounces."""
@@ -68,11 +69,6 @@ LEAD = 0.2
 """Longest time from the launch to the first row of a shot [s]."""
 FIRST_ROWS = 10
 """Number of rows from which the time of the launch is estimated."""
-SLOPE_SHARE = 0.05
-"""Step of the numeric derivatives, as a share of a number's scale."""
-CLOSE_ENOUGH = 1e-3
-"""Convergence limit: largest change of a number, as a share of its scale."""
-MAX_ROUNDS = 30
 
 
 def fitted(shots: Sequence[Shot], start: LaunchModel = START) -> LaunchModel:
@@ -129,27 +125,11 @@ def _missed_alone(model: LaunchModel, shot: Shot, moves: FloatArray) -> FloatArr
 
 def _solved(missed: Callable[[FloatArray], FloatArray], scales: FloatArray) -> FloatArray:
     """Returns the numbers (n,) with the least sum of squares of `missed`, starting from 0."""
-    numbers = np.zeros(len(scales))
-    misses = missed(numbers)
-    damping = 1.0
-    for _ in range(MAX_ROUNDS):
-        changed = (numbers + SLOPE_SHARE * scales * row for row in np.eye(len(scales)))
-        slopes = [(missed(each) - misses) / SLOPE_SHARE for each in changed]
-        matrix = np.stack(slopes, axis=1)
-        square, right = matrix.T @ matrix, -matrix.T @ misses
-        # less damping after an improving step, more damping until one is found
-        while damping < 1e12:
-            step = np.linalg.solve(square + damping * np.diag(np.diag(square)), right)
-            tried = numbers + scales * step
-            found = missed(tried)
-            if found @ found <= misses @ misses:
-                break
-            damping *= 10.0
-        else:
-            break
-        numbers, misses, damping = tried, found, damping / 100.0
-        if np.abs(step).max() < CLOSE_ENOUGH:
-            break
+    optimize = needed("scipy.optimize", "recordings", "the fit", package="o80-devices")
+    found = optimize.least_squares(
+        lambda shares: missed(scales * shares), np.zeros(len(scales)), method="lm"
+    )
+    numbers: FloatArray = scales * found.x
     return numbers
 
 
@@ -188,26 +168,21 @@ def _misses(model: LaunchModel, shots: Sequence[Shot], table: Table | None = TAB
 
 
 def _flight(ball: Launch, duration: float, table: Table | None = TABLE) -> FloatArray:
-    """Computes the positions (T, 3) of a ball, one for each PERIOD [m]."""
-    law = Rig(cameras=(), table=table).law()
-    position, velocity, spin = ball.position, ball.velocity, ball.spin
-    positions = [position]
-    for _ in range(round(duration / PERIOD)):
-        position, velocity, spin, _ = law.advance(position, velocity, spin, PERIOD)
-        positions.append(position)
-    return np.array(positions)
+    """Computes the flight of a ball: rows (K, 4) of time [s] and position [m]."""
+    start = np.concatenate([ball.position, ball.velocity, ball.spin])
+    return FlightLaw(Flight(), table).path(start, duration, PERIOD)[:, :4]
 
 
 def _missed(flight: FloatArray, shot: Shot) -> FloatArray:
     """Returns flight minus position for each row (N, 3); the first rows give the launch time."""
-    times = PERIOD * np.arange(len(flight))
+    times, *axes = flight.T
 
     def at(moments: FloatArray) -> FloatArray:
-        return np.stack([np.interp(moments, times, column) for column in flight.T], axis=1)
+        return np.stack([np.interp(moments, times, axis) for axis in axes], axis=1)
 
     lead = round(LEAD / PERIOD)
     first = shot.positions[:FIRST_ROWS]
-    begin = float(np.interp(first[0, 0], flight[:lead, 0], times[:lead]))
+    begin = float(np.interp(first[0, 0], axes[0][:lead], times[:lead]))
     since = shot.stamps[:FIRST_ROWS] + begin
     velocity = (at(since + PERIOD) - at(since)) / PERIOD
     begin += float(((first - at(since)) * velocity).sum() / (velocity**2).sum())

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from o80.errors import DriverError
+from o80.base.extras import needed
 
 NAMES = ("phi", "theta", "top_left_motor", "top_right_motor", "bottom_motor")
 DEFAULTS = (0.5, 0.5, 0.0, 0.0, 0.0)
@@ -87,13 +87,10 @@ class Request:
 
 @cache
 def _types() -> dict[str, Any]:
-    try:
-        from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
-    except ImportError as error:
-        raise DriverError(
-            f"the ball launcher speaks protobuf, which cannot be imported ({error}): "
-            "pip install 'o80-devices[zeromq]'"
-        ) from None
+    descriptor_pb2, descriptor_pool, message_factory = (
+        needed(f"google.protobuf.{name}", "zeromq", "the ball launcher", package="o80-devices")
+        for name in ("descriptor_pb2", "descriptor_pool", "message_factory")
+    )
     file = descriptor_pb2.FileDescriptorProto(
         name="o80_ball_launcher.proto", package="o80_ball_launcher", syntax="proto2"
     )

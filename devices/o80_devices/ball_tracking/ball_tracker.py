@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
-from o80.drivers import Reading, option
+from o80.drivers import Desired, Reading, option
 from o80_devices.ball_tracking import colour
 from o80_devices.ball_tracking.ball_row import EXTENDED, UNITS, Reason
 from o80_devices.ball_tracking.flight_track import Tracked
 from o80_devices.ball_tracking.tracker import Tracker, TrackerOptions
 from o80_devices.cameras.image_source import ImageSource
 from o80_devices.cameras.rig import Rig, four_cameras
-
-MAX_AHEAD = 4  # limit of the accumulated time by which images come early [periods]
+from o80_devices.frame_pace import FramePace
 
 
 class BallTracker:
@@ -47,51 +43,39 @@ class BallTracker:
         colours = colour.load(config.colours) if config.colours else None
         options = TrackerOptions(tolerance=config.tolerance, noise=config.noise)
         self._tracker = Tracker(self._rig, colours, options)
-        self._period = self._ahead = 0  # [ns]
+        self._pace = FramePace()
 
     def start(self) -> None:
         segments = [name.strip() for name in self._config.cameras.split(",") if name.strip()]
         self._source = ImageSource(segments, self._rig, self._config.skew)
         self._source.attach(self._config.timeout)
 
+    def write(self, desired: Desired) -> None:
+        self._pace.period = round(desired.period * 1e9)
+
     def wait(self, due: int) -> None:
-        """Waits for new images, at most until a quarter of a period after `due` [ns]."""
-        now = time.monotonic_ns()
-        self._period = max(self._period, due - now)
-        self._source.wait(max(0, due + self._period // 4 - now) * 1e-9)
-        now = time.monotonic_ns()
-        # cameras that catch up would drive the loop ahead of its clock, which is a fault: the
-        # loop then waits for its own clock, and reads the newest images
-        self._ahead = max(0, self._ahead + due - now)
-        if self._ahead > MAX_AHEAD * self._period and due > now:
-            time.sleep((due - now) * 1e-9)
-            self._ahead -= due - now
+        self._pace.wait(due, self._source.wait_until)
 
     def read(self, reading: Reading) -> None:
-        images = self._source.read(time.monotonic())
+        images = self._source.read()
         if images is None:
             reading.missed()
-            fill(reading, Tracked(reading.time, Reason.no_image), 0)
-            return
-        ball = self._tracker.track(images.images, images.time)
-        fill(reading, ball, images.time, images.error)
+            ball, taken, error = Tracked(reading.time, Reason.no_image), 0, 0
+        else:
+            ball = self._tracker.track(images.images, images.time)
+            taken, error = images.time, images.error
+        reading.extended = ball.fields() | {
+            "capture_error": error if ball.seen else 0,
+            "reason": ball.reason,
+            "covariance": ball.covariance,
+            "cameras": ball.cameras,
+            "residual": ball.residual,
+            "image_time": taken,
+            "stamp": taken,
+        }
 
     def on_forget(self, _fields: Mapping[str, Any]) -> None:
         self._tracker.forget()
 
     def stop(self) -> None:
         self._source.close()
-
-
-def fill(reading: Reading, ball: Tracked, image_time: int, error: int = 0) -> None:
-    """Writes the row. image_time: 0 without images [ns]. error: uncertainty of image_time [ns]."""
-    row = reading.extended
-    row["capture_error"] = error if ball.seen else 0
-    row["capture_time"] = ball.time if ball.seen else 0
-    row["reason"] = ball.reason
-    row["ball"] = ball.ball
-    for name in ("position", "velocity", "spin", "covariance", "measured", "residual"):
-        row[name] = getattr(ball, name)
-    row["error"] = ball.error if ball.seen else np.nan
-    row["cameras"] = ball.cameras
-    row["image_time"] = row["stamp"] = image_time

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -92,9 +91,3 @@ def load(path: Path | str) -> ColourTable:
     if table.dtype != np.uint8 or table.size != LEVELS**3:
         raise InvalidArgument(f"{path} holds no table of 32 x 32 x 32 bytes")
     return np.ascontiguousarray(table.ravel())
-
-
-def show(table: ColourTable, colour: Sequence[int]) -> int:
-    """The probability of a colour, 0 to 255."""
-    red, green, blue = (int(value) >> 3 for value in colour)
-    return int(table[red << 10 | green << 5 | blue])

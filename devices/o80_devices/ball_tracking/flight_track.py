@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from o80.base.arrays import FloatArray
-from o80_devices import _vision
+from o80_devices.ball_tracking.ball_filter import GATE, BallFilter
 from o80_devices.ball_tracking.ball_row import Reason
+from o80_devices.cameras.flight import FlightLaw
 
 NANOSECOND = 1e-9
 FASTEST = 20.0
@@ -54,6 +56,12 @@ class Tracked:
         """Standard deviation of the position, over all three axes [m]."""
         return float(np.sqrt(np.trace(self.covariance[:3, :3])))
 
+    def fields(self) -> dict[str, Any]:
+        """Values that the rows of all trackers have."""
+        names = ("ball", "position", "velocity", "spin", "error", "measured")
+        values = {name: getattr(self, name) for name in names}
+        return values | {"capture_time": self.time if self.seen else 0}
+
 
 @dataclass(frozen=True)
 class Point:
@@ -72,10 +80,10 @@ class Point:
 class FlightTrack:
     """Tracks one ball. Two unexpected positions that agree mean a hit or another ball."""
 
-    def __init__(self, law: _vision.FlightLaw, forget: float) -> None:
+    def __init__(self, law: FlightLaw, forget: float) -> None:
         self._law = law
         self._longest = forget
-        self._filter = _vision.BallFilter(law)
+        self._filter = BallFilter(law)
         self._last: Point | None = None  # the last sighting of the ball
         self._surprise: Point | None = None
         self._time = 0  # time of the filter [ns]
@@ -95,7 +103,7 @@ class FlightTrack:
         if self._last is None:
             return None, 0.0
         spread = float(np.sqrt(np.max(np.diag(self._filter.covariance)[:3])))
-        return self._filter.position, spread
+        return self._filter.ball[:3], spread
 
     def lost(self, time: int, reason: Reason) -> Tracked:
         self._predict_to(time)
@@ -121,13 +129,14 @@ class FlightTrack:
         if reason != Reason.seen:
             return Tracked(time, reason)
         self._last = point
+        position, velocity, spin = self._filter.ball.reshape(3, 3)
         return Tracked(
             time,
             Reason.seen,
             self._balls,
-            self._filter.position,
-            self._filter.velocity,
-            self._filter.spin,
+            position,
+            velocity,
+            spin,
             self._filter.covariance,
             place,
             cameras,
@@ -141,7 +150,7 @@ class FlightTrack:
             self._filter.begin(point.place, covariance)
             self._surprise = None
             return Reason.seen
-        if self._filter.distance(point.place, covariance) <= self._filter.gate:
+        if self._filter.distance(point.place, covariance) <= GATE:
             self._filter.update(point.place, covariance)
             self._surprise = None
             return Reason.seen

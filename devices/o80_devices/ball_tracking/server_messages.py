@@ -16,6 +16,7 @@ import numpy as np
 
 from o80.base.arrays import FloatArray
 from o80.base.finite import json_text
+from o80.drivers import option
 from o80_devices.ball_tracking.ball_row import Reason
 from o80_devices.ball_tracking.flight_track import FlightTrack, Tracked
 from o80_devices.cameras.rig import four_cameras
@@ -98,48 +99,48 @@ class Seen:
     stamp: int = 0
 
 
-@dataclass(frozen=True)
-class Place:
-    """Pose of the tracker's frame in the world."""
+@dataclass
+class Options:
+    """Options of the client of a tracking server."""
 
-    translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """[m]"""
-    rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Roll, pitch and yaw: about the axes x, y and z of the world, in this order [rad]."""
+    address: str = option("tcp://127.0.0.1:7660", "where the server publishes")
+    translation: tuple[float, float, float] = option(
+        (0.0, 0.0, 0.0), "of the tracker's frame in the world", "m"
+    )
+    rotation: tuple[float, float, float] = option(
+        (0.0, 0.0, 0.0), "of the tracker's frame: roll, pitch, yaw", "rad"
+    )
+    noise: float = option(0.003, "standard deviation of a place", "m")
+    latency: float = option(0.0, "from the image to the earliest arrival of its message", "s")
+    timeout: float = option(0.05, "without a message, after which the server is silent", "s")
+    max_age: float = option(0.1, "older messages are not used", "s")
+    forget: float = option(0.3, "a ball not seen for so long is another one", "s")
 
-    def in_world(self, point: FloatArray) -> FloatArray:
-        """Transforms a point (3,) from the tracker's frame to the world [m]."""
-        turned = point
-        for axis, angle in enumerate(self.rotation):
-            c, s = math.cos(angle), math.sin(angle)
-            one, other = (axis + 1) % 3, (axis + 2) % 3
-            turn = np.eye(3)
-            turn[one, one] = turn[other, other] = c
-            turn[one, other], turn[other, one] = -s, s
-            turned = turn @ turned
-        world: FloatArray = turned + np.array(self.translation)
-        return world
+
+def turned(rotation: tuple[float, float, float]) -> FloatArray:
+    """Rotation matrix (3, 3) of turns about the axes x, y and z of the world, in this order."""
+    matrix = np.eye(3)
+    for axis, angle in enumerate(rotation):
+        one, other = (axis + 1) % 3, (axis + 2) % 3
+        turn = np.eye(3)
+        turn[one, one] = turn[other, other] = math.cos(angle)
+        turn[other, one] = math.sin(angle)
+        turn[one, other] = -turn[other, one]
+        matrix = turn @ matrix
+    return matrix
 
 
 class ServerTrack:
     """Tracks the ball from messages; the caller passes the time."""
 
-    def __init__(
-        self,
-        place: Place = Place(),
-        *,
-        noise: float = 0.003,
-        latency: float = 0.0,
-        timeout: float = 0.05,
-        max_age: float = 0.1,
-        forget: float = 0.3,
-    ) -> None:
-        """noise: standard deviation of a place [m]; all others in [s]."""
-        self._place = place
-        self._covariance = noise**2 * np.eye(3)
-        self._clock = ClockMap(latency=latency)
-        self._timeout, self._max_age = round(timeout * SECOND), round(max_age * SECOND)
-        self._flight = FlightTrack(four_cameras().law(), forget)
+    def __init__(self, options: Options) -> None:
+        self._rotation = turned(options.rotation)
+        self._translation = np.array(options.translation)
+        self._covariance = options.noise**2 * np.eye(3)
+        self._clock = ClockMap(latency=options.latency)
+        self._timeout = round(options.timeout * SECOND)
+        self._max_age = round(options.max_age * SECOND)
+        self._flight = FlightTrack(four_cameras().law(), options.forget)
         self._newest: int | None = None  # arrival [ns]
 
     def silent(self, now: int) -> Seen:
@@ -162,7 +163,7 @@ class ServerTrack:
             return self._without(ServerReason.late, capture, message)
         if message.place is None:
             return self._without(ServerReason.not_seen, capture, message)
-        place = self._place.in_world(message.place)
+        place = self._rotation @ message.place + self._translation
         ball = self._flight.seen(
             capture.time, place, self._covariance, 0, math.nan, may_surprise=True
         )

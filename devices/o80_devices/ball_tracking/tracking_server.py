@@ -3,34 +3,22 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 import o80
-from o80.drivers import Reading, option
+from o80.base.extras import needed
+from o80.drivers import Reading
 from o80.errors import DriverError
-from o80_devices import zeromq
-from o80_devices.ball_tracking.server_messages import Place, Seen, ServerReason, ServerTrack
+from o80_devices.ball_tracking.ball_row import EXTENDED, UNITS
+from o80_devices.ball_tracking.server_messages import Options, ServerReason, ServerTrack
 
-
-@dataclass
-class Options:
-    """Options of the client of a tracking server."""
-
-    address: str = option("tcp://127.0.0.1:7660", "where the server publishes")
-    translation: tuple[float, float, float] = option(
-        (0.0, 0.0, 0.0), "of the tracker's frame in the world", "m"
-    )
-    rotation: tuple[float, float, float] = option(
-        (0.0, 0.0, 0.0), "of the tracker's frame: roll, pitch, yaw", "rad"
-    )
-    noise: float = option(0.003, "standard deviation of a place", "m")
-    latency: float = option(0.0, "from the image to the earliest arrival of its message", "s")
-    timeout: float = option(0.05, "without a message, after which the server is silent", "s")
-    max_age: float = option(0.1, "older messages are not used", "s")
-    forget: float = option(0.3, "a ball not seen for so long is another one", "s")
+FIELDS = (
+    *("capture_time", "capture_error", "stamp", "ball"),
+    *("position", "velocity", "spin", "error", "measured"),
+)
+"""Values of a row that a row of the tracker with cameras has, too."""
 
 
 class TrackingServer:
@@ -38,29 +26,11 @@ class TrackingServer:
 
     Config = Options
     frequency = 200.0
-    extended: ClassVar = {
-        "capture_time": np.int64,
-        "capture_error": np.int64,
+    extended: ClassVar = {name: EXTENDED[name] for name in FIELDS} | {
         "epoch": np.int64,
-        "stamp": np.int64,
         "reason": ServerReason,
-        "ball": np.int64,
-        "position": (np.float64, (3,)),
-        "velocity": (np.float64, (3,)),
-        "spin": (np.float64, (3,)),
-        "error": np.float64,
-        "measured": (np.float64, (3,)),
     }
-    units: ClassVar = {
-        "capture_time": "ns",
-        "capture_error": "ns",
-        "stamp": "ns",
-        "position": "m",
-        "velocity": "m/s",
-        "spin": "rad/s",
-        "error": "m",
-        "measured": "m",
-    }
+    units: ClassVar = {name: UNITS[name] for name in FIELDS if name in UNITS}
 
     def __init__(self, config: Options) -> None:
         for name in ("noise", "timeout", "max_age", "forget"):
@@ -74,18 +44,11 @@ class TrackingServer:
                     f"{name} must be three finite numbers, got {getattr(config, name)}"
                 )
         self._config = config
-        self._track = ServerTrack(
-            Place(config.translation, config.rotation),
-            noise=config.noise,
-            latency=config.latency,
-            timeout=config.timeout,
-            max_age=config.max_age,
-            forget=config.forget,
-        )
+        self._track = ServerTrack(config)
         self._socket: Any = None
 
     def start(self) -> None:
-        self._zmq = zmq = zeromq.required()
+        self._zmq = zmq = needed("zmq", "zeromq", "a tracking server", package="o80-devices")
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.SUB)
         self._socket.setsockopt(zmq.CONFLATE, 1)  # a queue of one, the newest message
@@ -108,24 +71,16 @@ class TrackingServer:
             seen = self._track.silent(time.monotonic_ns())
         else:
             seen = self._track.take(content, time.monotonic_ns())
-        fill(reading, seen)
+        capture = seen.capture
+        reading.extended = seen.ball.fields() | {
+            "capture_error": 0 if capture is None else capture.error,
+            "epoch": 0 if capture is None else capture.epoch,
+            "stamp": seen.stamp,
+            "reason": seen.reason,
+        }
 
     def stop(self) -> None:
         if self._socket is not None:
             self._socket.close(linger=0)
             self._context.destroy(linger=0)
             self._socket = None
-
-
-def fill(reading: Reading, seen: Seen) -> None:
-    """Writes the row."""
-    row, ball, capture = reading.extended, seen.ball, seen.capture
-    row["capture_time"] = ball.time if ball.seen else 0
-    row["capture_error"] = 0 if capture is None else capture.error
-    row["epoch"] = 0 if capture is None else capture.epoch
-    row["stamp"] = seen.stamp
-    row["reason"] = seen.reason
-    row["ball"] = ball.ball
-    for name in ("position", "velocity", "spin", "measured"):
-        row[name] = getattr(ball, name)
-    row["error"] = ball.error if ball.seen else np.nan

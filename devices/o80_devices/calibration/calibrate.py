@@ -102,7 +102,7 @@ def save_pictures(given: argparse.Namespace) -> None:
     try:
         while missing:
             source.wait(0.1)
-            images = source.read(time.monotonic())
+            images = source.read()
             for camera, image in zip(cameras, images.images if images else [], strict=False):
                 if image is not None and camera.name in missing:
                     file = given.output / f"{camera.name}.png"

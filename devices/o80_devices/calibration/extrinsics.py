@@ -47,19 +47,14 @@ def places_from_ball(
     seen by at least two cameras count.
     Raises InvalidArgument for too little motion or wrong corners, MissingExtra.
     """
-    waved = np.asarray(waved, float)
-    if waved.shape[1:] != (len(lenses), 2):
-        raise InvalidArgument(
-            f"waved must have the shape (moments, {len(lenses)}, 2), got {waved.shape}"
-        )
     check_motion(lenses, waved)
     cameras = adjusted(first_places(lenses, waved), waved)
     _check_depth(cameras, waved)
-    marks = np.moveaxis(np.asarray(corner_pixels, float), 0, 1)
+    marks = np.moveaxis(corner_pixels, 0, 1)
     seen = triangulated(cameras, marks)
     known: NDArray[np.bool_] = np.asarray(np.isfinite(seen).all(1))
     _check_corners(lenses, marks, known)
-    placed = in_world(cameras, seen[known], np.asarray(corners, float)[known])
+    placed = in_world(cameras, seen[known], corners[known])
     return Calibrated(placed, reprojection(placed, waved))
 
 

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from o80_devices.calibration.board import (
     picture,
 )
 from o80_devices.cameras.image_source import ImageSource
-from o80_devices.cameras.rig import RigCamera
+from o80_devices.cameras.rig import RigCamera, with_tuples
 
 FORMAT = "o80-ball-lenses-1"
 EVERY = 4
@@ -100,7 +99,7 @@ def boards_from_segments(
     last = time.monotonic()
     while any(len(found) < count for found in boards):
         source.wait(0.05)
-        images = source.read(time.monotonic())
+        images = source.read()
         for camera, found, image in zip(
             cameras, boards, images.images if images else [None] * len(cameras), strict=True
         ):
@@ -138,7 +137,7 @@ def load(path: Path | str) -> list[RigCamera]:
         content = json.loads(Path(path).read_text())
         if not isinstance(content, dict) or content.get("format") != FORMAT:
             raise InvalidArgument(f'"format" must be "{FORMAT}": make it with `calibrate lenses`')
-        cameras = [RigCamera(**_tuples(each)) for each in content["cameras"]]
+        cameras = [RigCamera(**with_tuples(each)) for each in content["cameras"]]
         for camera in cameras:
             camera.model()
         names = [camera.name for camera in cameras]
@@ -147,7 +146,3 @@ def load(path: Path | str) -> list[RigCamera]:
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise InvalidArgument(f"the lenses {path} cannot be used: {error}") from error
     return cameras
-
-
-def _tuples(fields: dict[str, Any]) -> dict[str, Any]:
-    return {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}

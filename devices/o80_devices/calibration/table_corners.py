@@ -12,7 +12,8 @@ import numpy as np
 
 from o80.base.arrays import FloatArray
 from o80.errors import InvalidArgument
-from o80_devices.cameras.rig import Table, vector
+from o80_devices.cameras.flight import Table
+from o80_devices.cameras.rig import vector
 
 EXAMPLE = '{"corners": {"camera_0": [[102.5, 300], [420, 310.5], [400, 120], null], ...}}'
 

@@ -130,7 +130,7 @@ def collected(
     last = time.monotonic()
     while len(kept) < moments:
         source.wait(0.05)
-        images = source.read(time.monotonic())
+        images = source.read()
         if images is not None:
             seen = np.array([finder.find(image) for image in images.images])
             if _is_new(seen, kept[-1] if kept else None):

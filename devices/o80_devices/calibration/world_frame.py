@@ -10,6 +10,7 @@ import numpy as np
 from o80.base.arrays import FloatArray
 from o80.errors import InvalidArgument
 from o80_devices.cameras.rig import RigCamera
+from o80_devices.motion_capture.transform import rotation_between
 
 WORST_FIT = 0.02
 """Largest distance of a point from its known place, as a share of the extent of all points."""
@@ -27,20 +28,15 @@ class Similarity:
 
     @classmethod
     def between(cls, seen: FloatArray, known: FloatArray) -> Similarity:
-        """Fits the similarity from seen points (n, 3) to known ones (Umeyama, 1991).
+        """Fits the similarity from seen points (n, 3) to known ones.
 
         Raises InvalidArgument for points on a line.
         """
-        seen_middle, known_middle = seen.mean(0), known.mean(0)
-        apart, wanted = seen - seen_middle, known - known_middle
-        left, sizes, right = np.linalg.svd(wanted.T @ apart)
-        if not sizes[1] > FLAT * sizes[0]:
+        found = rotation_between(seen, known)
+        if found is None:
             raise InvalidArgument("the corners lie in one line: they give no frame of the world")
-        # points in a plane fit a reflection equally well
-        mirror = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-        rotation = left @ np.diag(mirror) @ right
-        scale = float((sizes * mirror).sum() / (apart**2).sum())
-        return cls(scale, rotation, known_middle - scale * rotation @ seen_middle)
+        rotation, scale = found
+        return cls(scale, rotation, known.mean(0) - scale * rotation @ seen.mean(0))
 
     def of_points(self, points: FloatArray) -> FloatArray:
         moved: FloatArray = self.scale * points @ self.rotation.T + self.translation

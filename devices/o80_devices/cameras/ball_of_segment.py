@@ -8,43 +8,13 @@ from typing import Any
 import numpy as np
 
 import o80
+from o80_devices.attached import Attached
 from o80_devices.cameras.throws import FlyingBall
 
-RETRY = 50_000_000
-"""Interval between attempts to attach [ns]."""
 KEPT = 32
 """Number of stored pairs of a row and its time."""
 GAP = 3.0
 """Longest time before a row with a known time, in multiples of KEPT periods."""
-
-
-class Attached:
-    """Frontend of a segment that may end and restart."""
-
-    def __init__(self, segment: str, *, read_only: bool = True) -> None:
-        self._segment, self._read_only = segment, read_only
-        self._frontend: o80.Frontend | None = None
-        self._next_try: int | None = None
-
-    def frontend(self, now: int) -> tuple[o80.Frontend | None, bool]:
-        """Returns the frontend (None: no backend), and whether it is new since the last call."""
-        if self._frontend is not None and not self._frontend.alive:
-            self.close()
-        if self._frontend is not None:
-            return self._frontend, False
-        if self._next_try is not None and now < self._next_try:
-            return None, True
-        self._next_try = now + RETRY
-        try:
-            self._frontend = o80.Frontend(self._segment, timeout=0.0, read_only=self._read_only)
-        except o80.Error:
-            self.close()
-        return self._frontend, True
-
-    def close(self) -> None:
-        if self._frontend is not None:
-            self._frontend.close()
-        self._frontend = None
 
 
 class BallOfSegment:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from threading import Condition
 from typing import Any, ClassVar, get_args
 
 import numpy as np
@@ -11,9 +12,9 @@ import numpy as np
 from o80.drivers import Desired, Reading, option
 from o80.errors import InvalidArgument
 from o80_devices.cameras import aravis
-from o80_devices.cameras.newest_image import Arrivals, CameraReason, NewestImage
+from o80_devices.cameras.newest_image import CameraReason, NewestImage
 from o80_devices.cameras.pixel_formats import PixelFormat
-from o80_devices.motion_capture.frame_pace import FramePace
+from o80_devices.frame_pace import FramePace
 
 SECOND = 1_000_000_000  # [ns]
 
@@ -97,24 +98,21 @@ class GenicamCameras:
             exposure=config.exposure,
             trigger=config.trigger,
         )
-        self._arrivals = Arrivals()
+        self._arrived = Condition()
         self._cameras = [
-            NewestImage(name, settings, config.latency, self._arrivals) for name in self._sources
+            NewestImage(name, settings, config.latency, self._arrived) for name in self._sources
         ]
 
     def write(self, desired: Desired) -> None:
         self._pace.period = round(desired.period * SECOND)
 
     def wait(self, due: int) -> None:
-        earliest, latest = self._pace.times(due)
-        with self._arrivals.changed:
-            while not (complete := all(each.has_new for each in self._cameras)):
-                left = latest - time.monotonic_ns()
-                if left <= 0:
-                    break
-                self._arrivals.changed.wait(left / SECOND)
-        time.sleep(max(0, earliest - time.monotonic_ns()) / SECOND)
-        self._pace.returned(time.monotonic_ns(), missed=not complete)
+        self._pace.wait(due, self._images_arrive)
+
+    def _images_arrive(self, deadline: int) -> bool:
+        left = (deadline - time.monotonic_ns()) / SECOND
+        with self._arrived:
+            return self._arrived.wait_for(lambda: all(c.has_new for c in self._cameras), left)
 
     def read(self, reading: Reading) -> None:
         now, gap = time.monotonic_ns(), round(self._config.silent_after * SECOND)

@@ -10,10 +10,8 @@ import numpy as np
 
 import o80
 from o80.base.arrays import Image
+from o80_devices.attached import Attached
 from o80_devices.cameras.rig import Rig, RigCamera
-
-RETRY = 0.1
-"""Interval between attempts to attach to a missing segment [s]."""
 
 
 @dataclass(frozen=True)
@@ -27,26 +25,22 @@ class Images:
     """Estimated error of `time`, the largest of all cameras with an image [ns]; 0 if exact."""
 
 
-class CameraSegment:
+class CameraSegment(Attached):
     """Segment with the images of one camera, or of several that capture simultaneously."""
 
     def __init__(self, name: str) -> None:
-        self.name = name
-        self._frontend: o80.Frontend | None = None
+        super().__init__(name)
         self._iteration = -1
-        self._last_try: float | None = None
         self.images: list[Image | None] = []
         self.time = 0
         self.error = 0
 
-    def attach(self, timeout: float) -> None:
-        """Attaches. Raises TimeoutError, or InvalidArgument if the segment holds no images."""
-        self._frontend = o80.Frontend(self.name, timeout=timeout, read_only=True)
+    def check(self, frontend: o80.Frontend) -> None:
         self._iteration = -1
-        fields = self._frontend.latest().extended
+        fields = frontend.latest().extended
         if "images" not in fields or "capture_time" not in fields:
             raise o80.InvalidArgument(
-                f"the segment '{self.name}' holds no images: its rows need the extended values "
+                f"the segment '{self._segment}' holds no images: its rows need the extended values "
                 "'images' (cameras, bytes of an image) and 'capture_time'"
             )
 
@@ -58,23 +52,16 @@ class CameraSegment:
             self._frontend.wait_for(self._iteration + 1, timeout=max(timeout, 0.0))
         except o80.RowOverwritten:
             return True
-        except o80.TimeoutError:
-            return False
-        except o80.BackendGone:
+        except (o80.TimeoutError, o80.BackendGone):
             return False
         return True
 
-    def read(self, now: float) -> bool:
-        """Reads the newest row. Returns False if none is new. now: of any clock [s]."""
-        if self._frontend is None and not self._attached_again(now):
+    def read(self, now: int) -> bool:
+        """Reads the newest row. Returns False if none is new. now: of any clock [ns]."""
+        frontend, _ = self.frontend(now)
+        if frontend is None or frontend.published == self._iteration:
             return False
-        assert self._frontend is not None
-        if not self._frontend.alive:
-            self.close()
-            return False
-        if self._frontend.published == self._iteration:
-            return False
-        row = self._frontend.latest()
+        row = frontend.latest()
         self._iteration = row.iteration
         capture = int(row.extended["capture_time"])
         if capture == 0:  # a row without images
@@ -87,21 +74,6 @@ class CameraSegment:
             self.images = [image if new else None for image, new in pairs]
         self.error = int(np.max(row.extended["errors"])) if "errors" in row.extended else 0
         return True
-
-    def close(self) -> None:
-        if self._frontend is not None:
-            self._frontend.close()
-        self._frontend = None
-
-    def _attached_again(self, now: float) -> bool:
-        if self._last_try is not None and 0 <= now - self._last_try < RETRY:
-            return False
-        self._last_try = now
-        try:
-            self.attach(timeout=0.0)
-        except o80.Error:
-            self.close()
-        return self._frontend is not None
 
 
 class ImageSource:
@@ -122,12 +94,18 @@ class ImageSource:
 
     def wait(self, timeout: float) -> None:
         """Waits for images of the first segment, or until the timeout [s] has passed."""
-        end = time.monotonic() + timeout
-        if not self._segments[0].wait(timeout):
-            time.sleep(max(0.0, end - time.monotonic()))
+        self.wait_until(time.monotonic_ns() + round(timeout * 1e9))
 
-    def read(self, now: float) -> Images | None:
+    def wait_until(self, deadline: int) -> bool:
+        """Waits for images of the first segment, until a deadline [ns]. Returns if any came."""
+        came = self._segments[0].wait((deadline - time.monotonic_ns()) * 1e-9)
+        if not came:
+            time.sleep(max(0, deadline - time.monotonic_ns()) * 1e-9)
+        return came
+
+    def read(self) -> Images | None:
         """Returns unread images, or None. Raises InvalidArgument if they do not match the rig."""
+        now = time.monotonic_ns()
         came = [each.read(now) for each in self._segments]
         if not any(came):
             return None

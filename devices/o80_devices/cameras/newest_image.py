@@ -49,13 +49,6 @@ class Taken:
     number: int
 
 
-class Arrivals:
-    """Condition by which the loop waits for the threads of all cameras."""
-
-    def __init__(self) -> None:
-        self.changed = threading.Condition()
-
-
 class NewestImage:
     """Holds the newest image of one camera.
 
@@ -64,9 +57,10 @@ class NewestImage:
     """
 
     def __init__(
-        self, name: str, settings: aravis.Settings, latency: float, arrivals: Arrivals
+        self, name: str, settings: aravis.Settings, latency: float, arrived: threading.Condition
     ) -> None:
-        self._name, self._settings, self._arrivals = name, settings, arrivals
+        """arrived: condition by which the loop waits for the threads of all cameras."""
+        self._name, self._settings, self._arrived = name, settings, arrived
         self._clock = ClockMap(latency=latency)
         self._newest: Taken | None = None
         self._state = CameraReason.connecting
@@ -85,7 +79,7 @@ class NewestImage:
 
     def take(self, now: int, gap: int) -> tuple[Taken | None, CameraReason]:
         """Returns an image once. now: monotonic time [ns]. gap: limit of silence [ns]."""
-        with self._arrivals.changed:
+        with self._arrived:
             newest, self._newest = self._newest, None
             state, last = self._state, self._last
         if newest is not None:
@@ -156,10 +150,10 @@ class NewestImage:
                 return  # older than the last one
             capture = mapped
         self._trouble.is_over()
-        with self._arrivals.changed:
+        with self._arrived:
             self._newest = Taken(image, capture, buffer.stamp, buffer.number)
             self._state, self._last = CameraReason.seen, arrival
-            self._arrivals.changed.notify_all()
+            self._arrived.notify_all()
 
     def _count(self, number: int) -> None:
         """Adds the frames that are missing between the last number and this one to `lost`."""
@@ -173,5 +167,5 @@ class NewestImage:
             self.lost += missing
 
     def _set_state(self, state: CameraReason) -> None:
-        with self._arrivals.changed:
+        with self._arrived:
             self._state = state

@@ -18,9 +18,9 @@ from o80.base.arrays import FloatArray
 from o80.base.finite import json_text
 from o80.errors import InvalidArgument
 from o80_devices import _vision
+from o80_devices.cameras.flight import Flight, FlightLaw, Table, Vector
 
 FORMAT = "o80-ball-rig-1"
-Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -67,46 +67,6 @@ class RigCamera:
 
 
 @dataclass(frozen=True)
-class Flight:
-    """Forces of air and gravity on the ball; src/vision/flight.hpp has the formulas.
-
-    The defaults match the balls of the table-tennis application.
-    """
-
-    radius: float = 0.02
-    """[m]"""
-    drag: float = 0.1098
-    """[1/m]"""
-    magnus: float = 0.00626
-    saturation: float = 0.06
-    """Saturation of the lift [m]."""
-    spin_decay: float = 0.5
-    """[1/s]"""
-    gravity: Vector = (0.0, 0.0, -9.81)
-    """[m/s^2]"""
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table on which the ball bounces; its edges are parallel to the axes of the world."""
-
-    middle: Vector = (0.4, 1.57, 0.775)
-    """Middle of the surface [m]."""
-    half: tuple[float, float] = (0.7625, 1.37)
-    """Half the width along x and half the length along y [m]."""
-    kept_normal: float = 0.92
-    kept_tangential: float = 0.505
-    friction: float = 0.25
-
-    @property
-    def corners(self) -> FloatArray:
-        """Corners (4, 3) of the surface [m], counter-clockwise from the smallest x and y."""
-        signs = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
-        corners: FloatArray = np.asarray(self.middle) + signs * (*self.half, 0.0)
-        return corners
-
-
-@dataclass(frozen=True)
 class Rig:
     """Cameras, ball and table."""
 
@@ -117,19 +77,9 @@ class Rig:
     def models(self) -> list[_vision.Camera]:
         return [camera.model() for camera in self.cameras]
 
-    def law(self) -> _vision.FlightLaw:
-        """The law of flight and bounce for the filter."""
-        law = _vision.FlightLaw()
-        for name, value in asdict(self.flight).items():
-            setattr(law, name, value)
-        law.has_table = self.table is not None
-        if self.table is not None:
-            law.table = self.table.middle
-            law.half = self.table.half
-            law.kept_normal = self.table.kept_normal
-            law.kept_tangential = self.table.kept_tangential
-            law.friction = self.table.friction
-        return law
+    def law(self) -> FlightLaw:
+        """The law of flight and bounce. Raises MissingExtra without o80-mujoco."""
+        return FlightLaw(self.flight, self.table)
 
     def save(self, path: Path | str) -> None:
         text = json_text({"format": FORMAT, **asdict(self)}, indent=1)
@@ -142,12 +92,12 @@ class Rig:
             read = json.loads(Path(path).read_text())
             if not isinstance(read, dict) or read.pop("format", None) != FORMAT:
                 raise InvalidArgument(f'"format" must be "{FORMAT}"')
-            cameras = tuple(RigCamera(**_tuples(each)) for each in read["cameras"])
+            cameras = tuple(RigCamera(**with_tuples(each)) for each in read["cameras"])
             table = read.get("table")
             rig = Rig(
                 cameras,
-                Flight(**_tuples(read.get("flight", {}))),
-                None if table is None else Table(**_tuples(table)),
+                Flight(**with_tuples(read.get("flight", {}))),
+                None if table is None else Table(**with_tuples(table)),
             )
             rig.check()
         except (OSError, KeyError, TypeError, ValueError) as error:
@@ -168,7 +118,8 @@ class Rig:
             raise InvalidArgument("a value of the flight or table is not a number") from None
 
 
-def _tuples(fields: dict[str, Any]) -> dict[str, Any]:
+def with_tuples(fields: dict[str, Any]) -> dict[str, Any]:
+    """Fields of JSON with flat tuples in place of lists."""
     return {k: tuple(np.ravel(v).tolist()) if isinstance(v, list) else v for k, v in fields.items()}
 
 

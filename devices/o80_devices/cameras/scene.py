@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from o80.base.arrays import FloatArray, Image
-from o80_devices.cameras.rig import Rig, Table
+from o80_devices.cameras.flight import Table
+from o80_devices.cameras.rig import Rig
 
 BALL = np.array([245.0, 130.0, 35.0])
 FLOOR = np.array([[112.0, 104.0, 96.0], [124.0, 117.0, 108.0]])

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from o80.base.arrays import FloatArray
-from o80_devices.cameras.rig import Rig, Table
+from o80_devices.cameras.flight import Table
+from o80_devices.cameras.rig import Rig
 
 FLIGHT = 1.1
 """Duration of a flight [s]."""
@@ -42,9 +43,8 @@ class Throws:
         index, since = divmod(time, FLIGHT + PAUSE)
         if time < 0 or since > FLIGHT:
             return FlyingBall(0, *np.zeros((3, 3)))
-        begin = self.start(int(index) + 1)
-        position, velocity, spin, _ = self._law.advance(*begin, since)
-        return FlyingBall(int(index) + 1, position, velocity, spin)
+        ball, _ = self._law.advance(np.concatenate(self.start(int(index) + 1)), since)
+        return FlyingBall(int(index) + 1, *ball.reshape(3, 3))
 
     def start(self, number: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Returns initial position, velocity and spin of a ball."""

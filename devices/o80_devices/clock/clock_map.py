@@ -11,8 +11,6 @@ from o80_devices.clock.lower_envelope import LowerEnvelope
 SECOND = 1e9  # [ns]
 MILLISECOND = 1e6  # [ns]
 
-WINDOW = 30.0 * SECOND  # length of the interval whose points determine the line
-BUCKET = 0.5 * SECOND  # only the lowest point of a bucket is stored
 SETTLE = 10  # number of late buckets that prove a clock set back
 RECENT = 2  # buckets whose least delay counts as an error, in case the clock was set back
 
@@ -52,13 +50,11 @@ class ClockMap:
         wrap: int | None = None,
         latency: float = 0.0,
         latency_error: float = 0.0,
-        max_rate: float = 5e-4,
     ) -> None:
         """tick: unit of a stamp [ns]: 1000 for microseconds, 1e9 / 300 for frames at 300 Hz.
 
         wrap: number of stamps after which the counter wraps, such as 2**32.
         latency, latency_error: least delay from capture to arrival, and its error [s].
-        max_rate: largest relative difference of the device's clock from its tick.
         """
         if not 0 < tick < math.inf:
             raise InvalidArgument(f"tick must be positive and finite [ns], got {tick}")
@@ -69,15 +65,12 @@ class ClockMap:
                 "latency and latency_error must be finite and at least 0 s, got "
                 f"{latency}, {latency_error}"
             )
-        if not 0 <= max_rate <= 0.1:
-            raise InvalidArgument(f"max_rate must be between 0 and 0.1, got {max_rate}")
         self._tick = tick
         self._wrap = wrap
         self._latency = round(latency * SECOND)
         self._own_error = latency_error * SECOND + (tick if tick > 1.0 else 0.0)
-        self._max_rate = max_rate
         self._epoch = -1
-        self._envelope = self._new_envelope(0.0, min(USUAL_RATE, max_rate))
+        self._envelope = LowerEnvelope(0.0, USUAL_RATE)
         self._scatter: float | None = None  # of the previous epoch [ns]
         self._first = self._first_arrival = 0
         self._last = self._last_arrival = 0
@@ -192,16 +185,7 @@ class ClockMap:
         before = self._envelope
         if before:
             self._scatter = before.scatter(but_last=SETTLE) or before.scatter()
-            self._envelope = self._new_envelope(before.rate, before.rate_error)
+            self._envelope = LowerEnvelope(before.rate, before.rate_error)
         self._epoch += 1
         self._restarted = False
         self._first, self._first_arrival = stamp, arrival
-
-    def _new_envelope(self, rate: float, rate_error: float) -> LowerEnvelope:
-        return LowerEnvelope(
-            window=WINDOW,
-            bucket=BUCKET,
-            max_rate=self._max_rate,
-            rate=rate,
-            rate_error=rate_error,
-        )

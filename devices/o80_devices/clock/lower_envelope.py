@@ -15,6 +15,9 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 from statistics import median
 
+WINDOW = 30e9  # length of the interval whose points determine the line [ns]
+BUCKET = 0.5e9  # only the lowest point of a bucket is stored [ns]
+MAX_RATE = 5e-4  # largest relative difference of two clocks' rates
 WANDER = 2e-7  # drift of a quartz clock's rate within minutes
 NEWEST_KEPT = 4  # buckets that are kept beyond the window
 
@@ -31,18 +34,10 @@ class Bucket:
 
 
 class LowerEnvelope:
-    """Line y = base + rate x below all points of the last `window`."""
+    """Line y = base + rate x below all points of the last WINDOW."""
 
-    def __init__(
-        self, *, window: float, bucket: float, max_rate: float, rate: float, rate_error: float
-    ) -> None:
-        """window, bucket: lengths [ns]. max_rate: bound of |rate|.
-
-        rate, rate_error: estimate of the rate before the first point, and its standard error.
-        """
-        self._window = window
-        self._bucket = bucket
-        self._max_rate = max_rate
+    def __init__(self, rate: float, rate_error: float) -> None:
+        """Takes an estimate of the rate before the first point, and its standard error."""
         self._prior = (rate, rate_error)
         self._buckets: deque[Bucket] = deque()
         self._base = 0.0
@@ -70,7 +65,7 @@ class LowerEnvelope:
 
     def add(self, x: float, y: float) -> None:
         """Adds a point, later than all others; lowers the line to the point if necessary."""
-        if not self._buckets or x >= self._buckets[-1].begin + self._bucket:
+        if not self._buckets or x >= self._buckets[-1].begin + BUCKET:
             self._begin_bucket(x, y)
         above = self.above(x, y)
         if above < 0.0:
@@ -84,7 +79,7 @@ class LowerEnvelope:
         last.above += above
 
     def _begin_bucket(self, x: float, y: float) -> None:
-        while len(self._buckets) > NEWEST_KEPT and self._buckets[0].begin < x - self._window:
+        while len(self._buckets) > NEWEST_KEPT and self._buckets[0].begin < x - WINDOW:
             self._buckets.popleft()
         if self._buckets:
             self._fit()
@@ -105,7 +100,7 @@ class LowerEnvelope:
             trust = error**2 / (error**2 + fitted**2)
             rate += trust * (slope - rate)
             error = trust**0.5 * fitted
-        self.rate = min(max(rate, -self._max_rate), self._max_rate)
+        self.rate = min(max(rate, -MAX_RATE), MAX_RATE)
         self.rate_error = max(error, WANDER)
         self._base = min(y - self.rate * x for x, y in points)
         self._lowest_scatter = median(self.above(x, y) for x, y in points)

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from o80.base.extras import needed
 from o80.base.screen import keep_printing
-from o80_devices import zeromq
 from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL, Launch, LaunchModel
 from o80_devices.ball_launcher.messages import Kind, Request, State
 from o80_devices.ball_launcher.wheel_speeds import actuation_of, speed_of
@@ -64,7 +64,7 @@ class FakeLauncher:
         on_launch: Callable[[Launch], None] | None = None,
         say: Callable[[str], None] | None = None,
     ) -> None:
-        self._zmq = zeromq.required()
+        self._zmq = needed("zmq", "zeromq", "the ball launcher", package="o80-devices")
         self._context = self._zmq.Context()
         self._behaviour = behaviour
         self._model = model
@@ -223,36 +223,23 @@ def serve(fake: FakeLauncher, address: str, restart: float) -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    import argparse
-
     usual = Behaviour()
-    parser = argparse.ArgumentParser(
-        prog="python -m o80_devices.fakes.ball_launcher", description="A fake ball launcher."
+    parser = numbers.parser(
+        "ball_launcher",
+        address=(str, "tcp://127.0.0.1:5555", "where it listens"),
+        state_time=(numbers.not_negative, usual.state_time, "of a change of state [s]"),
+        launch_time=(numbers.not_negative, usual.launch_time, "of a launch [s]"),
+        magazine=(numbers.count, usual.magazine, "balls in it"),
+        refuse=(numbers.share, usual.refuse, "share of requests that fail"),
+        crash_at=(numbers.count, usual.crash_at, "dies in the middle of this launch"),
+        restart=(float, -1.0, "after a crash [s]; -1: never"),
+        seed=(numbers.count, usual.seed, "of the scatter of launches"),
+        tracking=(str, "", "address at which the balls are published as tracked"),
+        place=(numbers.vector, PLACE, "of the launcher in the world [m]"),
+        yaw=(float, YAW, "of the launcher [rad]"),
     )
-    parser.add_argument("--address", default="tcp://127.0.0.1:5555", help="where it listens")
-    parser.add_argument(
-        "--state-time", type=numbers.not_negative, default=usual.state_time, help="[s]"
-    )
-    parser.add_argument(
-        "--launch-time", type=numbers.not_negative, default=usual.launch_time, help="[s]"
-    )
-    parser.add_argument("--magazine", type=numbers.count, default=100, help="balls in it")
-    parser.add_argument(
-        "--refuse", type=numbers.share, default=0.0, help="share of requests that fail"
-    )
-    parser.add_argument(
-        "--crash-at", type=numbers.count, default=0, help="dies in the middle of this launch"
-    )
-    parser.add_argument("--restart", type=float, default=-1.0, help="after a crash [s]; -1: never")
-    parser.add_argument("--seed", type=numbers.count, default=0)
-    parser.add_argument(
-        "--tracking", default="", help="address at which the balls are published as tracked"
-    )
-    parser.add_argument(
-        "--place", type=numbers.vector, default=PLACE, help="of the launcher in the world [m]"
-    )
-    parser.add_argument("--yaw", type=float, default=YAW, help="of the launcher [rad]")
     given = vars(parser.parse_args(arguments))
+    zmq = needed("zmq", "zeromq", "the ball launcher", package="o80-devices")
     address, restart, tracking = given.pop("address"), given.pop("restart"), given.pop("tracking")
     place, yaw = given.pop("place"), given.pop("yaw")
     with contextlib.ExitStack() as stack:
@@ -263,7 +250,7 @@ def main(arguments: list[str] | None = None) -> None:
             balls = LaunchedBalls(place, yaw, noise=TRACKING_NOISE, seed=given["seed"])
             try:
                 on_launch = stack.enter_context(TrackedLauncher(tracking, balls)).launched
-            except zeromq.required().ZMQError as error:
+            except zmq.ZMQError as error:
                 parser.error(f"the address {tracking} cannot be used: {error}")
         fake = FakeLauncher(
             Behaviour(**given), on_launch=on_launch, say=lambda text: print(text, flush=True)
@@ -272,7 +259,7 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"fake ball launcher at {address}; Ctrl-C ends it", flush=True)
         try:
             serve(fake, address, restart)
-        except zeromq.required().ZMQError as error:
+        except zmq.ZMQError as error:
             parser.error(f"the address {address} cannot be used: {error}")
         except KeyboardInterrupt:
             pass

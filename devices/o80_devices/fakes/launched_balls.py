@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from threading import Event, Lock, Thread
 
 import numpy as np
 
+from o80.base.arrays import FloatArray
 from o80_devices.ball_launcher.launch_model import Launch
 from o80_devices.ball_tracking.server_messages import Message
-from o80_devices.cameras.rig import Rig, Table
+from o80_devices.cameras.flight import Flight, FlightLaw, Table
 from o80_devices.fakes.tracking_server import RATE, FakeTrackingServer
 
 SECOND = 1_000_000_000  # [ns]
 SEEN_FOR = 3.0
 """Time after a launch for which a ball is tracked [s]."""
-STEP = 0.01
-"""Time step of a simulated flight [s]."""
 
 
 class LaunchedBalls:
@@ -28,35 +26,30 @@ class LaunchedBalls:
         position: tuple[float, float, float],
         yaw: float,
         *,
-        table: Table | None = None,
         noise: float = 0.0,
         seed: int = 0,
     ) -> None:
         """position, yaw: pose of the launcher in the world [m], [rad]. noise: of a place [m]."""
         self._position, self._yaw = position, yaw
-        self._law = Rig(cameras=(), table=table or Table()).law()
+        self._law = FlightLaw(Flight(), Table())
         self._noise, self._rng = noise, np.random.default_rng(seed)
-        self._ball: Launch | None = None
-        self._time = self._launched = 0  # [ns]
+        self._ball: FloatArray | None = None
+        self._launched = 0  # [ns]
 
     def launched(self, ball: Launch, now: int) -> None:
-        self._ball = ball.placed(self._position, self._yaw)
-        self._time = self._launched = now
+        placed = ball.placed(self._position, self._yaw)
+        self._ball = np.concatenate([placed.position, placed.velocity, placed.spin])
+        self._launched = now
 
     def message(self, now: int) -> Message:
-        """Returns the tracker's message at a time [ns]; times must not decrease."""
-        while self._ball is not None and self._time < now:
-            step = min(round(STEP * SECOND), now - self._time)
-            ball = self._ball
-            moved = self._law.advance(ball.position, ball.velocity, ball.spin, step / SECOND)
-            self._ball = replace(ball, position=moved[0], velocity=moved[1], spin=moved[2])
-            self._time += step
-            lies = self._ball.position[2] < 0 or now - self._launched > SEEN_FOR * SECOND
-            if lies:
-                self._ball = None
-        if self._ball is None:
+        """Returns the tracker's message at a time [ns], not before the last launch."""
+        since = (now - self._launched) / SECOND
+        if self._ball is None or since > SEEN_FOR:
             return Message(now, None)
-        return Message(now, self._ball.position + self._noise * self._rng.standard_normal(3))
+        place = self._law.advance(self._ball, since)[0][:3]
+        if place[2] < 0.0:  # it has fallen to the floor
+            return Message(now, None)
+        return Message(now, place + self._noise * self._rng.standard_normal(3))
 
 
 class TrackedLauncher:

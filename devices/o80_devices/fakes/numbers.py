@@ -1,10 +1,19 @@
-"""Parses numbers on the command lines of fakes; errors name the option."""
+"""Command lines of fakes, and the numbers on them; errors name the option."""
 
 from __future__ import annotations
 
 import argparse
 import math
 from collections.abc import Callable
+from typing import Any
+
+
+def parser(fake: str, **options: tuple[Callable[[str], Any], Any, str]) -> argparse.ArgumentParser:
+    """Parser of the module `fake`. options: type, default and help by name."""
+    made = argparse.ArgumentParser(prog=f"python -m o80_devices.fakes.{fake}")
+    for name, (kind, default, text) in options.items():
+        made.add_argument(f"--{name.replace('_', '-')}", type=kind, default=default, help=text)
+    return made
 
 
 def positive(text: str) -> float:

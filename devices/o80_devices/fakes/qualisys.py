@@ -3,7 +3,6 @@
 python -m o80_devices.fakes.qualisys --bodies racket,table --lose 0.1 --silent-every 10
 """
 
-import argparse
 import contextlib
 import math
 import random
@@ -261,17 +260,15 @@ def packed(pose: Pose | None, component: str) -> bytes:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(prog="python -m o80_devices.fakes.qualisys")
-    parser.add_argument("--bodies", default="racket,table", help="names, separated by commas")
-    parser.add_argument("--port", type=numbers.port, default=PORT)
-    parser.add_argument("--frequency", type=numbers.positive, default=300.0, help="[Hz]")
-    parser.add_argument(
-        "--lose", type=numbers.share, default=0.0, help="share of the frames that are lost"
+    parser = numbers.parser(
+        "qualisys",
+        bodies=(str, "racket,table", "names, separated by commas"),
+        port=(numbers.port, PORT, "little endian"),
+        frequency=(numbers.positive, 300.0, "[Hz]"),
+        lose=(numbers.share, 0.0, "share of the frames that are lost"),
+        silent_every=(numbers.not_negative, 0.0, "[s]: silent for 2 s"),
+        restart_every=(numbers.not_negative, 0.0, "[s]"),
     )
-    parser.add_argument(
-        "--silent-every", type=numbers.not_negative, default=0.0, help="[s]: silent for 2 s"
-    )
-    parser.add_argument("--restart-every", type=numbers.not_negative, default=0.0, help="[s]")
     given = parser.parse_args(arguments)
     try:
         made = FakeQualisys(given.bodies.split(","), frequency=given.frequency, port=given.port)

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from o80.base.extras import needed
 from o80.base.screen import keep_printing
-from o80_devices import zeromq
 from o80_devices.ball_tracking.robot_and_ball import RobotAndBall
 from o80_devices.ball_tracking.server_messages import Message
 from o80_devices.cameras.rig import four_cameras
@@ -31,7 +31,7 @@ class FakeTrackingServer:
 
     def __init__(self, address: str) -> None:
         """address: port 0 takes any free one."""
-        zmq = zeromq.required()
+        zmq = needed("zmq", "zeromq", "a tracking server", package="o80-devices")
         self._context = zmq.Context()
         self._socket: Any = self._context.socket(zmq.PUB)
         self._socket.setsockopt(zmq.LINGER, 0)
@@ -66,30 +66,23 @@ def recorded(path: Path) -> Iterator[tuple[int, Message]]:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    import argparse
-
-    parser = argparse.ArgumentParser(
-        prog="python -m o80_devices.fakes.tracking_server", description="A fake tracking server."
+    parser = numbers.parser(
+        "tracking_server",
+        address=(str, "tcp://127.0.0.1:7660", "where it publishes"),
+        recording=(Path, None, "file of a robot and a ball to play"),
+        noise=(numbers.not_negative, 0.003, "of thrown balls [m]"),
+        lose=(numbers.share, 0.0, "share of messages that are lost"),
+        clock=(numbers.not_negative, 1e9, "its clock at the start [s]"),
+        pause_at=(float, -1.0, "when it makes a pause [s]"),
+        pause=(numbers.not_negative, 2.0, "for how long [s]"),
+        seed=(numbers.count, 0, "of the throws and losses"),
     )
-    parser.add_argument("--address", default="tcp://127.0.0.1:7660", help="where it publishes")
-    parser.add_argument("--recording", type=Path, help="file of a robot and a ball to play")
-    parser.add_argument(
-        "--noise", type=numbers.not_negative, default=0.003, help="of thrown balls [m]"
-    )
-    parser.add_argument(
-        "--lose", type=numbers.share, default=0.0, help="share of messages that are lost"
-    )
-    parser.add_argument(
-        "--clock", type=numbers.not_negative, default=1e9, help="its clock at the start [s]"
-    )
-    parser.add_argument("--pause-at", type=float, default=-1.0, help="when it makes a pause [s]")
-    parser.add_argument("--pause", type=numbers.not_negative, default=2.0, help="for how long [s]")
-    parser.add_argument("--seed", type=numbers.count, default=0)
     given = parser.parse_args(arguments)
+    zmq = needed("zmq", "zeromq", "a tracking server", package="o80-devices")
     messages = recorded(given.recording) if given.recording else thrown(given.seed, given.noise)
     try:
         server = FakeTrackingServer(given.address)
-    except zeromq.required().ZMQError as error:
+    except zmq.ZMQError as error:
         parser.error(f"the address {given.address} cannot be used: {error}")
     print(f"fake tracking server at {server.address}; Ctrl-C ends it", flush=True)
     rng, start = np.random.default_rng(given.seed), time.monotonic_ns()

@@ -74,12 +74,8 @@ class FrameStream:
 
     def next(self, deadline: int) -> Frame | None:
         with self._arrived:
-            while not self._frames:
-                left = deadline - time.monotonic_ns()
-                if left <= 0:
-                    return None
-                self._arrived.wait(left / SECOND)
-            return self._frames.popleft()
+            self._arrived.wait_for(lambda: self._frames, (deadline - time.monotonic_ns()) / SECOND)
+            return self._frames.popleft() if self._frames else None
 
     # ------------------------------------------------------------------ the thread
 

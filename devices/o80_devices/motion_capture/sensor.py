@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import re
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -18,8 +17,8 @@ from o80.base.screen import complain
 from o80.drivers import Desired, Reading, option
 from o80.errors import InvalidArgument
 from o80_devices.clock import ClockMap
+from o80_devices.frame_pace import FramePace
 from o80_devices.motion_capture.frame import Frame, Subject
-from o80_devices.motion_capture.frame_pace import FramePace
 from o80_devices.motion_capture.transform import Transform
 
 SECOND = 1_000_000_000  # [ns]
@@ -134,11 +133,12 @@ class Sensor:
         self._pace.period = round(desired.period * SECOND)
 
     def wait(self, due: int) -> None:
-        earliest, latest = self._pace.times(due)
-        self._waited = self._frames.next(latest)
         self._has_waited = True
-        time.sleep(max(0, earliest - time.monotonic_ns()) / SECOND)
-        self._pace.returned(time.monotonic_ns(), missed=self._waited is None)
+        self._pace.wait(due, self._frame_arrives)
+
+    def _frame_arrives(self, deadline: int) -> bool:
+        self._waited = self._frames.next(deadline)
+        return self._waited is not None
 
     def read(self, reading: Reading) -> None:
         if self._last_seen is None:

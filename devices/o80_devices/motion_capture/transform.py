@@ -30,7 +30,7 @@ class Transform:
     def estimated(
         cls, measured: Mapping[str, Sequence[float]], known: Mapping[str, Sequence[float]]
     ) -> Transform:
-        """Fits the rigid transform from measured points to known ones (Kabsch, 1976).
+        """Fits the rigid transform from measured points to known ones .
 
         Raises InvalidArgument for fewer than three common points, or points on a line.
         """
@@ -44,14 +44,11 @@ class Transform:
         target = np.array([known[name] for name in names], float)
         if not (np.isfinite(source).all() and np.isfinite(target).all()):
             raise InvalidArgument("points must be finite: leave out points that were not visible")
-        middle, goal = source.mean(axis=0), target.mean(axis=0)
-        left, sizes, right = np.linalg.svd((source - middle).T @ (target - goal))
-        if sizes[1] < 1e-6 * sizes[0] or sizes[0] == 0.0:
+        found = rotation_between(source, target)
+        if found is None:
             raise InvalidArgument(f"the points {names} lie on a line: add one beside it")
-        # points in a plane fit a reflection equally well
-        sign = np.sign(np.linalg.det(right.T @ left.T))
-        rotation = right.T @ np.diag([1.0, 1.0, sign]) @ left.T
-        translation = goal - rotation @ middle
+        rotation = found[0]
+        translation = target.mean(axis=0) - rotation @ source.mean(axis=0)
         left_over = np.linalg.norm(source @ rotation.T + translation - target, axis=1)
         return cls(rotation, translation, dict(zip(names, left_over.tolist(), strict=True)))
 
@@ -97,6 +94,20 @@ class Transform:
         """Transforms a position [m] and a quaternion (x, y, z, w) to the world."""
         turned = product(quaternion_of(self.rotation), quaternion)
         return tuple(self.of_point(position).tolist()), turned
+
+
+def rotation_between(source: Array, target: Array) -> tuple[Array, float] | None:
+    """Rotation (3, 3), and scale, that fit points (n, 3) to others best, each about its mean.
+
+    None for points on a line. (Umeyama, 1991)
+    """
+    apart, wanted = source - source.mean(axis=0), target - target.mean(axis=0)
+    left, sizes, right = np.linalg.svd(wanted.T @ apart)
+    if not sizes[1] > 1e-6 * sizes[0]:
+        return None
+    # points in a plane fit a reflection equally well
+    mirror = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    return left @ np.diag(mirror) @ right, float((sizes * mirror).sum() / (apart**2).sum())
 
 
 def quaternion_of(rotation: Array) -> tuple[float, ...]:

@@ -26,7 +26,7 @@ from o80.errors import DriverError, InvalidArgument
 from o80_devices.motion_capture.frame import Frame, Subject
 from o80_devices.motion_capture.frame_stream import LONGEST_RETRY, SILENCE, FrameStream
 from o80_devices.motion_capture.sensor import Sensor, SensorConfig
-from o80_devices.motion_capture.watched_line import STARTED
+from o80_devices.motion_capture.watched_child import STARTED
 
 CHILD = "o80_devices.motion_capture.watched_child"
 STARTING = 60.0  # timeout of the child's imports, long enough for a busy machine [s]

@@ -12,8 +12,9 @@ from typing import Any
 
 from o80.base.descriptors import open_standard_streams
 from o80.base.finite import json_text
-from o80_devices.motion_capture.watched_line import STARTED
 
+STARTED = b"started"
+"""First line, printed when the client begins to connect. Each later one is a frame in JSON."""
 PR_SET_PDEATHSIG = 1
 
 

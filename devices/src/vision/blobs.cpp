@@ -6,6 +6,8 @@ namespace o80::vision {
 
 namespace {
 
+constexpr int kThreshold = 96;  // least probability of a pixel, of 255
+
 std::uint8_t probability(const ColourTable& table, const std::uint8_t* pixel) noexcept {
   const auto index =
       static_cast<std::size_t>((pixel[0] >> 3) << 10 | (pixel[1] >> 3) << 5 | (pixel[2] >> 3));
@@ -52,7 +54,7 @@ void BlobFinder::find_runs(const Image& image, const Region& region, const BlobR
     bool open = false;
     for (int x = region.left; x < region.right; x += step) {
       const std::uint8_t value = probability(table_, line + 3L * x);
-      if (value < rule.threshold) {
+      if (value < kThreshold) {
         open = false;
         continue;
       }
@@ -107,16 +109,12 @@ Blobs BlobFinder::find(const Image& image, Region region, const BlobRule& rule) 
   Blobs found;
   for (const Sum& sum : sums) {
     const double area = sum.pixels * per_pixel;
-    if (sum.pixels == 0 || area < rule.min_area || area > rule.max_area) continue;
-    const Region bounds{region.left + sum.left * rule.step, region.top + sum.top * rule.step,
-                        region.left + sum.right * rule.step, region.top + sum.bottom * rule.step};
-    const bool cut = bounds.left <= region.left || bounds.top <= region.top ||
-                     bounds.right >= region.right || bounds.bottom >= region.bottom;
-    keep_largest(found, {{sum.x / sum.weight, sum.y / sum.weight},
-                         area,
-                         sum.weight * per_pixel / 255,
-                         cut,
-                         bounds});
+    if (sum.pixels == 0 || area < rule.min_area) continue;
+    const bool cut = sum.left == 0 || sum.top == 0 ||
+                     region.left + sum.right * rule.step >= region.right ||
+                     region.top + sum.bottom * rule.step >= region.bottom;
+    keep_largest(
+        found, {{sum.x / sum.weight, sum.y / sum.weight}, area, sum.weight * per_pixel / 255, cut});
   }
   return found;
 }

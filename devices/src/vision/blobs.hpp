@@ -29,7 +29,6 @@ struct Blob {
   double area = 0;    // [px^2]
   double weight = 0;  // sum of the probabilities, each 0 to 1, times area per searched pixel
   bool cut = false;   // touches the border of the region: the centre is not the ball's
-  Region bounds;
 };
 
 inline constexpr int kMaxBlobs = 8;
@@ -42,9 +41,7 @@ struct Blobs {
 /// Criteria of a blob.
 struct BlobRule {
   int step = 1;         // search every step-th pixel of every step-th row
-  int threshold = 96;   // least probability of a pixel, of 255
   double min_area = 6;  // [px^2]
-  double max_area = 1e9;
 };
 
 /// Finds the blobs of ball colour in a region, the largest first. Memory is reused from

@@ -22,7 +22,6 @@ struct Projection {
 /// Pinhole camera with radial and tangential distortion, in OpenCV's form:
 /// r2 = x^2 + y^2, x' = x (1 + k1 r2 + k2 r2^2 + k3 r2^3) + 2 p1 x y + p2 (r2 + 2 x^2).
 struct Camera {
-  std::array<double, 2> size{640, 480};              // width, height [px]
   std::array<double, 2> focal{600, 600};             // [px]
   std::array<double, 2> centre{319.5, 239.5};        // [px]
   std::array<double, 5> distortion{};                // k1, k2, p1, p2, k3
@@ -43,10 +42,6 @@ struct Camera {
   /// Returns the viewing direction of a pixel in the world, of length 1. Nothing if no direction
   /// projects to it.
   std::optional<Vector> direction(const Pixel& pixel) const noexcept;
-
-  bool contains(const Pixel& pixel) const noexcept {
-    return pixel.x >= -0.5 && pixel.x < size[0] - 0.5 && pixel.y >= -0.5 && pixel.y < size[1] - 0.5;
-  }
 };
 
 }  // namespace o80::vision

@@ -8,6 +8,8 @@ namespace o80::vision {
 
 namespace {
 
+constexpr double kSizeFactor = 4;  // largest ratio of a blob's size to the ball's expected one
+
 /// Agreeing sightings, one a camera.
 struct Chosen {
   std::array<const Sighting*, kMaxCameras> sightings;
@@ -106,8 +108,7 @@ class Search {
     const Camera& camera = camera_of(sighting);
     const double expected = std::numbers::pi * camera.focal[0] * camera.focal[1] * rule_.radius *
                             rule_.radius / (depth * depth);
-    return sighting.area < rule_.size_factor * expected &&
-           sighting.area * rule_.size_factor > expected;
+    return sighting.area < kSizeFactor * expected && sighting.area * kSizeFactor > expected;
   }
 
   /// Minimises the squares of distances in the images by Gauss-Newton.

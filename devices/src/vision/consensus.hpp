@@ -17,11 +17,10 @@ struct Sighting {
 };
 
 struct ConsensusRule {
-  double tolerance = 3;    // largest distance between a sighting and the projected point [px]
-  double noise = 0.3;      // standard deviation of a sighting [px]
-  double radius = 0.02;    // of the ball [m]
-  double size_factor = 4;  // largest ratio of a blob's size to the ball's expected one
-  int least = 2;           // cameras
+  double tolerance = 3;  // largest distance between a sighting and the projected point [px]
+  double noise = 0.3;    // standard deviation of a sighting [px]
+  double radius = 0.02;  // of the ball [m]
+  int least = 2;         // cameras
   std::optional<Vector> expected{};  // expected place of the ball [m]
 };
 

@@ -1,4 +1,4 @@
-// o80_devices._vision: cameras, detection, consensus and the filter of a ball, for Python.
+// o80_devices._vision: cameras, detection and consensus, for Python.
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -18,7 +18,6 @@
 #include "vision/blobs.hpp"
 #include "vision/camera.hpp"
 #include "vision/consensus.hpp"
-#include "vision/filter.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;  // NOLINT(google-build-using-namespace)
@@ -36,7 +35,6 @@ using Table =
 using Bytes = nb::ndarray<const std::uint8_t, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
 using Three = std::array<double, 3>;
 using Place = nb::ndarray<const double, nb::shape<3>, nb::c_contig, nb::device::cpu>;
-using Square = nb::ndarray<const double, nb::shape<3, 3>, nb::c_contig, nb::device::cpu>;
 using Nine = std::array<double, 9>;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
@@ -60,19 +58,13 @@ Doubles array_of(const Matrix<R, C>& matrix) {
 
 Vector vector(const Place& values) { return {{values(0), values(1), values(2)}}; }
 
-Matrix<3, 3> square(const Square& values) {
-  Matrix<3, 3> made;
-  std::copy_n(values.data(), made.values.size(), made.values.begin());
-  return made;
-}
-
 Camera camera(const std::array<double, 2>& size, const std::array<double, 2>& focal,
               const std::array<double, 2>& centre, const std::array<double, 5>& distortion,
               const Nine& rotation, const Three& translation) {
   if (!(size[0] >= 1) || !(size[1] >= 1) || !(focal[0] > 0) || !(focal[1] > 0)) {
     throw nb::value_error("the size and the focal lengths of a camera must be positive");
   }
-  Camera made{size, focal, centre, distortion, {rotation}, {translation}};
+  Camera made{focal, centre, distortion, {rotation}, {translation}};
   const Matrix<3, 3> unit = made.rotation * transposed(made.rotation);
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
@@ -114,13 +106,12 @@ BlobFinder blob_finder(const Table& table) {
 }
 
 Doubles find(BlobFinder& finder, const Bytes& image, std::optional<std::array<int, 4>> region,
-             int step, int threshold, double min_area, double max_area) {
+             int step, double min_area) {
   constexpr std::size_t kLargest = 1 << 14;
   if (image.shape(0) > kLargest || image.shape(1) > kLargest) {
     throw nb::value_error("an image can have at most 16384 rows and columns");
   }
   if (step < 1 || step > 64) throw nb::value_error("step must be from 1 to 64");
-  if (threshold < 1 || threshold > 255) throw nb::value_error("threshold must be from 1 to 255");
   const Image seen{image.data(), static_cast<int>(image.shape(1)),
                    static_cast<int>(image.shape(0))};
   const Region where = region ? Region{(*region)[0], (*region)[1], (*region)[2], (*region)[3]}
@@ -128,7 +119,7 @@ Doubles find(BlobFinder& finder, const Bytes& image, std::optional<std::array<in
   Blobs blobs;
   {
     const nb::gil_scoped_release released;
-    blobs = finder.find(seen, where, {step, threshold, min_area, max_area});
+    blobs = finder.find(seen, where, {.step = step, .min_area = min_area});
   }
   double* values = nullptr;
   Doubles made = array({static_cast<std::size_t>(blobs.count), 5}, values);
@@ -145,7 +136,7 @@ Doubles find(BlobFinder& finder, const Bytes& image, std::optional<std::array<in
 
 std::optional<std::tuple<Doubles, Doubles, std::uint64_t, double>> locate_ball(
     const std::vector<Camera>& cameras, const Sightings& sightings, double tolerance, double noise,
-    double radius, double size_factor, int least, const std::optional<Place>& expected) {
+    double radius, int least, const std::optional<Place>& expected) {
   if (cameras.size() > kMaxCameras) throw nb::value_error("there can be at most 16 cameras");
   std::vector<Sighting> list;
   for (std::size_t i = 0; i < std::min(sightings.shape(0), kMaxSightings); ++i) {
@@ -155,86 +146,12 @@ std::optional<std::tuple<Doubles, Doubles, std::uint64_t, double>> locate_ball(
     }
     list.push_back({static_cast<int>(camera), {sightings(i, 1), sightings(i, 2)}, sightings(i, 3)});
   }
-  ConsensusRule rule{tolerance, noise, radius, size_factor, least, std::nullopt};
+  ConsensusRule rule{tolerance, noise, radius, least, std::nullopt};
   if (expected) rule.expected = vector(*expected);
   const std::optional<Located> found = locate(cameras, list, rule);
   if (!found) return std::nullopt;
   return std::tuple(array_of(found->point), array_of(found->covariance), found->cameras,
                     found->residual);
-}
-
-std::tuple<Doubles, Doubles, Doubles, int> advance(const FlightLaw& law, const Place& position,
-                                                   const Place& velocity, const Place& spin,
-                                                   double duration) {
-  int bounces = 0;
-  const Ball end =
-      advanced({vector(position), vector(velocity), vector(spin)}, law, duration, bounces);
-  return {array_of(end.position), array_of(end.velocity), array_of(end.spin), bounces};
-}
-
-void bind_filter(nb::module_& module) {
-  nb::class_<FlightLaw>(module, "FlightLaw", "Air, gravity and the table; see flight.hpp.")
-      .def(nb::init<>())
-      .def_rw("drag", &FlightLaw::drag)
-      .def_rw("magnus", &FlightLaw::magnus)
-      .def_rw("saturation", &FlightLaw::saturation)
-      .def_rw("spin_decay", &FlightLaw::spin_decay)
-      .def_rw("radius", &FlightLaw::radius)
-      .def_rw("has_table", &FlightLaw::has_table)
-      .def_prop_rw(
-          "gravity", [](const FlightLaw& law) { return law.gravity.values; },
-          [](FlightLaw& law, const Three& value) { law.gravity.values = value; })
-      .def_prop_rw(
-          "table", [](const FlightLaw& law) { return law.table.values; },
-          [](FlightLaw& law, const Three& value) { law.table.values = value; })
-      .def_rw("half", &FlightLaw::half)
-      .def_rw("kept_normal", &FlightLaw::kept_normal)
-      .def_rw("kept_tangential", &FlightLaw::kept_tangential)
-      .def_rw("friction", &FlightLaw::friction)
-      .def("advance", &advance, "position"_a, "velocity"_a, "spin"_a, "duration"_a,
-           "Position, velocity and spin after a time [s], and the number of bounces.");
-
-  nb::class_<BallFilter>(module, "BallFilter", "A Kalman filter with the law of flight.")
-      .def(
-          "__init__",
-          [](BallFilter* self, const FlightLaw& law) { new (self) BallFilter(law, {}); }, "law"_a)
-      .def(
-          "begin",
-          [](BallFilter& self, const Place& point, const Square& covariance,
-             const std::optional<Place>& velocity, double spread) {
-            if (velocity) {
-              self.begin(vector(point), square(covariance), vector(*velocity), spread);
-            } else {
-              self.begin(vector(point), square(covariance));
-            }
-          },
-          "point"_a, "covariance"_a, "velocity"_a = nb::none(), "spread"_a = 1.0)
-      .def("predict", &BallFilter::predict, "duration"_a)
-      .def(
-          "distance",
-          [](const BallFilter& self, const Place& point, const Square& covariance) {
-            return self.distance(vector(point), square(covariance));
-          },
-          "point"_a, "covariance"_a)
-      .def(
-          "update",
-          [](BallFilter& self, const Place& point, const Square& covariance) {
-            self.update(vector(point), square(covariance));
-          },
-          "point"_a, "covariance"_a)
-      .def_prop_ro("gate", [](const BallFilter& self) { return self.rule().gate; })
-      .def_prop_ro(
-          "position", [](const BallFilter& self) { return array_of(self.ball().position); },
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "velocity", [](const BallFilter& self) { return array_of(self.ball().velocity); },
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "spin", [](const BallFilter& self) { return array_of(self.ball().spin); },
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "covariance", [](const BallFilter& self) { return array_of(self.covariance()); },
-          nb::rv_policy::automatic);
 }
 
 }  // namespace
@@ -243,7 +160,7 @@ void bind_filter(nb::module_& module) {
 
 NB_MODULE(_vision, module) {
   using namespace o80::vision;  // NOLINT(google-build-using-namespace)
-  module.doc() = "Cameras, detection of a ball in images, its place and its flight.";
+  module.doc() = "Cameras, detection of a ball in images, and its place.";
   nb::class_<Camera>(module, "Camera", "A pinhole camera with distortion, as OpenCV writes it.")
       .def(
           "__init__",
@@ -265,13 +182,10 @@ NB_MODULE(_vision, module) {
           "__init__",
           [](BlobFinder* self, const Table& table) { new (self) BlobFinder(blob_finder(table)); },
           "table"_a, "table: (32768,) probabilities, 0 to 255, by 5 bits of red, green, blue.")
-      .def("find", &find, "image"_a, "region"_a = nb::none(), "step"_a = 1, "threshold"_a = 96,
-           "min_area"_a = 6.0, "max_area"_a = 1e9,
+      .def("find", &find, "image"_a, "region"_a = nb::none(), "step"_a = 1, "min_area"_a = 6.0,
            "(n, 5): x, y [px], area [px^2], weight, 1 if the region cuts it; the largest first.");
   module.def("locate", &locate_ball, "cameras"_a, "sightings"_a, "tolerance"_a = 3.0,
-             "noise"_a = 0.3, "radius"_a = 0.02, "size_factor"_a = 4.0, "least"_a = 2,
-             "expected"_a = nb::none(),
+             "noise"_a = 0.3, "radius"_a = 0.02, "least"_a = 2, "expected"_a = nb::none(),
              "sightings (n, 4): camera, x, y, area => point, covariance, cameras as bits, residual "
              "[px] of the largest consistent subset; None: no cameras agree.");
-  bind_filter(module);
 }

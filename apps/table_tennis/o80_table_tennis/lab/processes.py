@@ -18,7 +18,7 @@ from pathlib import Path
 import o80
 from o80.base.child_process import end_child
 from o80.base.lifecycle import Closeable
-from o80_devices.cameras.ball_of_segment import Attached
+from o80_devices.attached import Attached
 
 from .parts import Part
 

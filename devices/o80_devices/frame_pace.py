@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
+
 MAX_AHEAD = 3.0  # periods; the loop allows ten, see docs/drivers/own_clock.md
 
 
@@ -18,15 +21,17 @@ class FramePace:
         self._last: int | None = None
         self._missed = False
 
-    def times(self, due: int) -> tuple[int, int]:
-        """Earliest and latest time at which the next wait may return [ns]."""
+    def wait(self, due: int, arrives: Callable[[int], bool]) -> None:
+        """Waits for a frame of the iteration that is due [ns].
+
+        arrives: waits until a deadline [ns] at most; returns whether a frame has arrived.
+        """
         spare = round(MAX_AHEAD * self.period) - self._ahead
         earliest = due - max(0, min(self.period, spare))
         # after a missed frame the return is on time, so that iterations stay in phase
-        return earliest, due if self._missed else due + self.period // 4
-
-    def returned(self, now: int, *, missed: bool) -> None:
+        self._missed = not arrives(due if self._missed else due + self.period // 4)
+        time.sleep(max(0, earliest - time.monotonic_ns()) * 1e-9)
+        now = time.monotonic_ns()
         if self._last is not None:
             self._ahead = max(0, self._ahead + self.period - (now - self._last))
         self._last = now
-        self._missed = missed
