@@ -158,6 +158,7 @@ def test_a_living_robot_keeps_its_name(recorded: Path, segment: str) -> None:
         ({"begin": 2.0, "end": 1.0}, "end must be later than begin"),
         ({"history": 0}, "history"),
         ({"history": 2**63}, "history must be less than"),
+        ({"segments": "aram"}, "no segment 'aram'"),
     ],
 )
 def test_mistakes_are_named(recorded: Path, arguments: dict[str, Any], message: str) -> None:
