@@ -15,6 +15,7 @@ import o80
 from o80.drivers import Desired, Reading
 from o80.replaying.recorded_run import runs_in
 from o80.replaying.replay import RunReplay
+from o80.rows.actuators import blending
 
 JOINT = {"position": float, "velocity": float}
 NAMES = ("shoulder", "elbow", "wrist")
@@ -189,6 +190,15 @@ def test_the_command_says_what_was_compared(recorded: Path) -> None:
     assert done.stderr == ""
     assert "compared: desired states" in done.stdout
     assert "does not declare that it is simulated" in done.stdout
+
+
+def test_a_nested_type_with_an_interpolation_of_its_own_is_interpolated_by_numbers() -> None:
+    turn = {"fields": [], "blends": True}  # only the driver's blend() of a whole state is called
+    nested = {"fields": [{"kind": "struct", "type": turn}]}
+    actuators = [{"name": "wrist", "group": 0}, {"name": "tool", "group": 1}]
+    assert blending({"groups": [{"type": turn}, {"type": nested}], "actuators": actuators}) == [
+        "wrist"
+    ]
 
 
 def test_rows_of_another_robot_are_refused(recorded: Path) -> None:
