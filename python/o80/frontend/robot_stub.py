@@ -367,7 +367,7 @@ class Module:
         for request in self._schema["requests"]:
             called = copy.deepcopy(verb)
             arguments, fields = called.args, request["type"]["fields"]
-            taken = {each.arg for each in arguments.kwonlyargs}
+            taken = {each.arg for each in [*arguments.posonlyargs, *arguments.kwonlyargs]}
             if all(_is_argument(field["name"], taken) for field in fields):
                 arguments.kwarg = None
                 for field in fields:

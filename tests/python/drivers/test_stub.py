@@ -155,7 +155,7 @@ def test_the_module_of_any_robot_attaches_to_it(
 ) -> None:
     name = f"test-stub-{os.getpid()}"
     file = tmp_path_factory.mktemp("stub") / "robot.py"
-    with o80.Backend(name, groups, extended=sensors, requests={"go": {"to": Gear}}) as backend:
+    with o80.Backend(name, groups, extended=sensors, requests={"go": {"name": Gear}}) as backend:
         backend.publish()
         file.write_text(module_of(backend.schema, name))
         with attach_of(file)(read_only=True) as frontend:
