@@ -50,7 +50,7 @@ def test_the_actuators_that_commands_drive_are_named(segment: str, robot: Manual
 
 
 def test_fields_are_chosen_by_path(segment: str, robot: ManualBackend) -> None:
-    expected = {"desired": [0.0, 0.5], "extended.gear": "FORWARD", "active.elbow": False}
+    expected = {"observed": [0.0, 0.5], "extended.gear": "FORWARD", "active.elbow": False}
     chosen = json.loads(echo(segment, "--count", "1", "--json", "--fields", ",".join(expected)))
     del chosen["iteration"], chosen["time"]
     assert chosen == expected
