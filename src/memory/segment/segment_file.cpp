@@ -1,6 +1,5 @@
 #include "memory/segment/segment_file.hpp"
 
-#include <fcntl.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
@@ -8,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 
 #include "base/crash_point.hpp"
 #include "base/printable.hpp"
@@ -182,13 +182,9 @@ std::string describe_owner(const SegmentHeader& header) {
 std::string own_user() { return user_name(geteuid()); }
 
 std::string own_program() {
-  char name[64] = "";
-  const int file = open("/proc/self/comm", O_RDONLY | O_CLOEXEC);
-  if (file < 0) return "unknown";
-  ssize_t length = read(file, name, sizeof name - 1);
-  close(file);
-  while (length > 0 && name[length - 1] == '\n') --length;
-  return text_of(name, length > 0 ? static_cast<std::size_t>(length) : 0);
+  std::string name;
+  std::ifstream file("/proc/self/comm");
+  return std::getline(file, name) ? printable(name) : "unknown";
 }
 
 std::string own_process() { return "pid " + std::to_string(getpid()) + " (" + own_program() + ")"; }
