@@ -1,5 +1,6 @@
 #include "memory/segment/segment_file.hpp"
 
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
@@ -7,7 +8,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 
 #include "base/crash_point.hpp"
 #include "base/printable.hpp"
@@ -104,23 +104,9 @@ mode_t commanders_mode(mode_t permission) noexcept {
 }
 
 const char* name_of(Life life) noexcept {
-  switch (life) {
-    case Life::starting:
-      return "starting";
-    case Life::running:
-      return "running";
-    case Life::stopped:
-      return "stopped";
-    case Life::failed:
-      return "failed";
-    case Life::superseded:
-      return "superseded";
-    case Life::killed:
-      return "killed";
-    case Life::unknown:
-      break;
-  }
-  return "unknown";
+  constexpr const char* kNames[] = {"starting",   "running", "stopped", "failed",
+                                    "superseded", "killed",  "unknown"};
+  return kNames[static_cast<std::size_t>(life)];
 }
 
 const char* SegmentState::word() const noexcept {
@@ -133,19 +119,11 @@ const char* SegmentState::word() const noexcept {
 Life life_of(int descriptor, const std::atomic<std::uint32_t>& state) noexcept {
   // load the state after the lock: a backend stores its end before it releases the lock
   const bool held = is_byte_locked(descriptor, kBackendByte);
-  switch (static_cast<BackendState>(state.load(std::memory_order_acquire))) {  // sync state
-    case BackendState::stopped:
-      return Life::stopped;
-    case BackendState::failed:
-      return Life::failed;
-    case BackendState::superseded:
-      return Life::superseded;
-    case BackendState::starting:
-      return held ? Life::starting : Life::killed;
-    case BackendState::running:
-      break;
-  }
-  return held ? Life::running : Life::killed;
+  const auto stored = static_cast<Life>(state.load(std::memory_order_acquire));  // sync state
+  if (stored == Life::stopped || stored == Life::failed || stored == Life::superseded)
+    return stored;
+  if (!held) return Life::killed;
+  return stored == Life::starting ? Life::starting : Life::running;
 }
 
 void end_segment(const SegmentView& view, BackendState state) noexcept {
@@ -182,9 +160,13 @@ std::string describe_owner(const SegmentHeader& header) {
 std::string own_user() { return user_name(geteuid()); }
 
 std::string own_program() {
-  std::string name;
-  std::ifstream file("/proc/self/comm");
-  return std::getline(file, name) ? printable(name) : "unknown";
+  char name[64] = "";
+  const int file = open("/proc/self/comm", O_RDONLY | O_CLOEXEC);
+  if (file < 0) return "unknown";
+  ssize_t length = read(file, name, sizeof name - 1);
+  close(file);
+  while (length > 0 && name[length - 1] == '\n') --length;
+  return text_of(name, length > 0 ? static_cast<std::size_t>(length) : 0);
 }
 
 std::string own_process() { return "pid " + std::to_string(getpid()) + " (" + own_program() + ")"; }

@@ -12,7 +12,7 @@
 #include "o80/runtime/not_completed.hpp"
 #include "runtime/frontend/ends_text.hpp"
 #include "runtime/frontend/link.hpp"
-#include "runtime/frontend/sent.hpp"
+#include "runtime/frontend/sending.hpp"
 
 namespace o80 {
 

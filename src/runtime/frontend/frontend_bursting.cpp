@@ -7,7 +7,7 @@
 
 #include "o80/runtime/frontend.hpp"
 #include "runtime/frontend/link.hpp"
-#include "runtime/frontend/sent.hpp"
+#include "runtime/frontend/sending.hpp"
 
 namespace o80 {
 

@@ -7,7 +7,7 @@
 #include "base/short_text.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "runtime/frontend/link.hpp"
-#include "runtime/frontend/sent.hpp"
+#include "runtime/frontend/sending.hpp"
 #include "runtime/protocol/schedule_limits.hpp"
 
 namespace o80 {
@@ -35,12 +35,13 @@ std::string seconds_text(std::int64_t nanoseconds) {
   return text.str();
 }
 
+void check_range(const char* name, std::int64_t value, std::int64_t low, std::int64_t high) {
+  if (value >= low && value <= high) return;
+  throw InvalidArgument(std::string(name) + " must be from " + std::to_string(low) + " to " +
+                        std::to_string(high) + ", got " + std::to_string(value));
+}
+
 void check_pace(const PaceSpec& pace, std::uint32_t rows) {
-  const auto check = [&pace](const std::string& name, std::int64_t low, std::int64_t high) {
-    if (pace.amount >= low && pace.amount <= high) return;
-    throw InvalidArgument(name + " must be from " + std::to_string(low) + " to " +
-                          std::to_string(high) + ", got " + std::to_string(pace.amount));
-  };
   const auto check_time = [&pace](const std::string& name) {
     if (pace.amount >= 0 && pace.amount <= kLongestDuration) return;
     throw InvalidArgument(name + " must be from 0 to " + seconds_text(kLongestDuration) + ", got " +
@@ -56,9 +57,9 @@ void check_pace(const PaceSpec& pace, std::uint32_t rows) {
     case Pace::duration:
       return check_time("duration");
     case Pace::iterations:
-      return check("iterations", 1, kMaxIterations);
+      return check_range("iterations", pace.amount, 1, kMaxIterations);
     case Pace::until:
-      if (rows == 1) return check("until", 0, kMaxIterations);
+      if (rows == 1) return check_range("until", pace.amount, 0, kMaxIterations);
       throw InvalidArgument("until is for one target: for a trajectory give iterations or times");
   }
 }
@@ -107,16 +108,11 @@ void check_times(std::span<const std::int64_t> times, std::uint32_t rows, std::i
 }
 
 void check_chunk(std::span<const std::uint32_t> due, const ChunkOptions& options) {
-  const auto check = [](const char* name, std::int64_t value, std::int64_t low, std::int64_t high) {
-    if (value >= low && value <= high) return;
-    throw InvalidArgument(std::string(name) + " must be from " + std::to_string(low) + " to " +
-                          std::to_string(high) + ", got " + std::to_string(value));
-  };
   const auto rows = static_cast<std::int64_t>(due.size());
-  check("the number of rows of a chunk", rows, 1, kMaxChunkRows);
-  check("first (the first row to play)", options.first, 0, rows - 1);
-  check("ease [iterations]", options.ease, 0, kLatestDue);
-  check("the anchor", options.anchor, -std::int64_t{kLatestDue}, kMaxIterations);
+  check_range("the number of rows of a chunk", rows, 1, kMaxChunkRows);
+  check_range("first (the first row to play)", options.first, 0, rows - 1);
+  check_range("ease [iterations]", options.ease, 0, kLatestDue);
+  check_range("the anchor", options.anchor, -std::int64_t{kLatestDue}, kMaxIterations);
   std::int64_t before = 0;
   for (std::size_t i = 0; i < due.size(); before = due[i++]) {
     if (due[i] > before && due[i] <= kLatestDue) continue;

@@ -7,7 +7,7 @@
 #include "control/queue/controller.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "runtime/frontend/ends_text.hpp"
-#include "runtime/frontend/sent.hpp"
+#include "runtime/frontend/sending.hpp"
 
 namespace o80 {
 
