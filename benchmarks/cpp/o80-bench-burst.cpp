@@ -40,7 +40,7 @@ void measure_round_trips(int rounds) {
   const auto inline_robot = std::make_shared<InlineRobot>(
       std::make_unique<DriverInstance>(*robot_table<TwoEmpty>("empty"), OptionValues{}),
       BackendOptions{.segment = name + "-inline", .bursting = true});
-  UntypedFrontend inline_frontend(name + "-inline", inline_robot);
+  UntypedFrontend inline_frontend(inline_robot->backend(), inline_robot);
 
   for (int round = 0; round < rounds; ++round) {
     line.rest(false);

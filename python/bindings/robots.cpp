@@ -42,7 +42,7 @@ Attachment start_inline(const o80::RobotLibrary& library, const std::string& seg
   auto robot = std::make_shared<o80::InlineRobot>(
       std::make_unique<o80::DriverInstance>(*library.table, options), std::move(backend),
       Waiting::keep_waiting);
-  return {std::make_shared<o80::UntypedFrontend>(robot->segment(), robot), robot};
+  return {std::make_shared<o80::UntypedFrontend>(robot->backend(), robot), robot};
 }
 
 /// Description of a robot with these options. The robot is constructed, but not started.

@@ -11,6 +11,8 @@ enum class BackendState : std::uint32_t { starting, running, stopped, failed, su
 /// lock without a stored end means that the process was killed. Unknown if the segment
 /// cannot be read.
 enum class Life { starting, running, stopped, failed, superseded, killed, unknown };
+// its first values are those that are stored
+static_assert(static_cast<int>(Life::superseded) == static_cast<int>(BackendState::superseded));
 const char* name_of(Life life) noexcept;
 /// True if the backend has ended. An end is final.
 constexpr bool is_over(Life life) noexcept {

@@ -64,9 +64,7 @@ class UntypedFrontend {
  public:
   /// Waits for the backend, up to the timeout. Throws TimeoutError, SegmentError, BackendFailed.
   explicit UntypedFrontend(const std::string& segment, const FrontendOptions& options = {});
-  /// Frontend of an inline robot: bursts run in the calling thread.
-  UntypedFrontend(const std::string& segment, std::shared_ptr<InlineRunner> runner);
-  /// Frontend of an inline robot whose segment may have no name.
+  /// Frontend of an inline robot, whose segment may have no name: bursts run in the calling thread.
   UntypedFrontend(const UntypedBackend& backend, std::shared_ptr<InlineRunner> runner);
   UntypedFrontend(UntypedFrontend&&) noexcept;
   UntypedFrontend& operator=(UntypedFrontend&&) noexcept;
@@ -167,7 +165,7 @@ class UntypedFrontend {
 
   /// Sends the added records as one batch. Throws LaneFull (nothing is sent, all records stay
   /// added), NoLane, ReadOnly, BackendGone.
-  Batch pulse(const PulseOptions& options = {}) { return pulse(options, 0); }
+  Batch pulse(const PulseOptions& options = {});
   /// Sends the records of `batch`; added records stay added.
   Batch pulse(BatchBuilder& batch, const std::optional<Seen>& seen = {});
   /// As `pulse`; also makes a bursting backend run until all records have ended.
@@ -273,51 +271,11 @@ class UntypedFrontend {
 
  private:
   BatchBuilder& own_builder();
-  RecordHead checked_command(std::uint32_t actuator, std::span<const std::byte> state,
-                             const CommandOptions& options,
-                             std::span<const std::uint64_t> mask) const;
-  void check_actuators(std::span<const std::uint32_t> actuators,
-                       std::span<const std::uint64_t> masks) const;
-  template <class Visit>
-  void each_share(std::span<const std::uint32_t> actuators, std::uint32_t rows,
-                  std::span<const std::byte> states, std::span<const std::uint64_t> masks,
-                  Visit&& visit) const;
-  CommandOptions checked_trajectory(std::uint32_t actuator, std::uint32_t rows,
-                                    std::span<const std::byte> states,
-                                    const CommandOptions& options,
-                                    std::span<const std::int64_t> times,
-                                    std::span<const std::uint64_t> mask) const;
-  Batch pulse(const PulseOptions& options, std::uint16_t flags);
   void wait_for_rest(std::uint64_t number, const Deadline& deadline,
                      const KeepWaiting& keep_waiting);
-  /// Whether the statuses of a batch will be read.
-  enum class Requested : std::uint8_t { yes, no };
-  Sent send(BatchBuilder& builder, const BatchRecord& record, const std::optional<Seen>& seen = {},
-            Requested requested = Requested::yes);
-  static BatchRecord batch_of(const PulseOptions& options);
-  Sent send_burst(BatchBuilder& builder, std::int64_t iterations, const PulseOptions& options,
-                  Requested requested);
-  UntypedObservation burst(BatchBuilder& builder, std::int64_t iterations, Timeout timeout,
-                           const KeepWaiting& keep_waiting, const PulseOptions& options);
-  std::uint32_t add_commands_to(BatchBuilder& builder, std::span<const std::uint32_t> actuators,
-                                std::span<const std::byte> states, const CommandOptions& options,
-                                std::span<const std::uint64_t> masks) const;
-  Preview preview_after(const Rows& rows, std::span<const std::uint32_t> actuators,
-                        std::span<const std::byte> states, const CommandOptions& options,
-                        std::span<const std::uint64_t> masks) const;
   UntypedObservation first_row_of(const Move& move, const Deadline& deadline,
                                   const KeepWaiting& keep_waiting) const;
   UntypedObservation burst_to(const Move& move, Timeout timeout, const KeepWaiting& keep_waiting);
-  friend std::vector<Burst> start_bursts(std::span<const BurstMember> group,
-                                         const std::optional<Seen>& seen);
-  void refuse_burst(std::int64_t iterations) const;
-  void refuse_unless_ready(std::int64_t iterations, const std::optional<Seen>& seen);
-  CommandId draw_ids(LaneSender& lane, std::uint64_t n, bool stays);
-  void refuse_if_too_much(const BatchBuilder& builder) const;
-  void refuse_if_too_many_wait(Iteration at, const LaneSender& lane);
-  void refuse_if_full(const BatchBuilder& builder, const BatchRecord& wanted,
-                      const LaneSender& lane) const;
-  [[noreturn]] void missing(Iteration k) const;
   void wait_for_latest(std::byte* row) const;
 
   std::shared_ptr<Link> link_;

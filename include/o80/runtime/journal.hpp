@@ -140,7 +140,7 @@ class Journal {
   void seek_end();
 
  private:
-  class Body;
+  struct Body;
   std::unique_ptr<Body> body_;
 };
 

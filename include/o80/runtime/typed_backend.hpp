@@ -104,13 +104,18 @@ class Backend final : private RequestServer {
     if (server == servers_.end()) {
       return Served::rejected("this request has no handler: call on<Request>(...)");
     }
+    return caught("request", [&] { return server->second(payload.data()); });
+  }
+  /// The answer of a handler; failed if it throws.
+  template <class Handler>
+  static Served caught(const char* of, Handler&& handler) noexcept {
     try {
-      return server->second(payload.data());
+      return handler();
     } catch (const std::exception& error) {
       return Served::failed(error.what());
     } catch (...) {
-      return Served::failed(
-          "the handler of a request threw something that is not a std::exception");
+      return Served::failed("the handler of a " + std::string(of) +
+                            " threw something that is not a std::exception");
     }
   }
   bool read_fresh(FreshReading& reading) noexcept override {
@@ -136,13 +141,7 @@ class Backend final : private RequestServer {
     }
   }
   Served resume() noexcept override {
-    try {
-      return resume_ ? resume_() : Served::done();
-    } catch (const std::exception& error) {
-      return Served::failed(error.what());
-    } catch (...) {
-      return Served::failed("the handler of a resume threw something that is not a std::exception");
-    }
+    return caught("resume", [&] { return resume_ ? resume_() : Served::done(); });
   }
 
   std::map<std::uint32_t, std::function<Served(const std::byte*)>> servers_;

@@ -28,11 +28,6 @@ class Frontend : public UntypedFrontend {
       : UntypedFrontend(segment, options) {
     compare();
   }
-  /// Frontend of an inline robot: bursts run in the calling thread.
-  Frontend(const std::string& segment, std::shared_ptr<InlineRunner> runner)
-      : UntypedFrontend(segment, std::move(runner)) {
-    compare();
-  }
 
   using UntypedFrontend::add_command;
   /// Adds a command by index or by name; the state must be of the actuator's type.

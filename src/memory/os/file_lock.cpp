@@ -62,11 +62,6 @@ bool LockFile::try_lock(std::uint64_t byte) noexcept {
   return fcntl(descriptor_, F_OFD_SETLK, &range) == 0;
 }
 
-void LockFile::unlock(std::uint64_t byte) noexcept {
-  struct flock range = one_byte(F_UNLCK, byte);
-  fcntl(descriptor_, F_OFD_SETLK, &range);
-}
-
 void LockFile::close() noexcept {
   if (descriptor_ < 0) return;
   // in a forked child the number may by now belong to another file

@@ -40,7 +40,6 @@ class LockFile {
   int descriptor() const noexcept { return descriptor_; }
   /// True if this file now holds the lock of the byte.
   bool try_lock(std::uint64_t byte) noexcept;
-  void unlock(std::uint64_t byte) noexcept;
   void close() noexcept;
 
  private:

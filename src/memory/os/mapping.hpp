@@ -19,7 +19,6 @@ class Mapping {
   ~Mapping();
 
   std::byte* data() const noexcept { return data_; }
-  std::size_t bytes() const noexcept { return bytes_; }
   /// Maps some pages of a mapping writable, at the same address. Throws SegmentError.
   static void make_writable(std::byte* base, int descriptor, std::uint64_t offset,
                             std::size_t bytes);

@@ -23,40 +23,6 @@ void nap(std::int64_t at_most) noexcept {
   if (at_most > 0) usleep(static_cast<useconds_t>(std::min(at_most, kGlance) / 1000));
 }
 
-/// One sleep, which any of the rows ends.
-class Sleep {
- public:
-  explicit Sleep(std::span<const RowOf> rows) : rows_(rows) {
-    words_.reserve(rows.size());
-    views_.reserve(rows.size());
-  }
-
-  void sleep(std::int64_t at_most) {
-    words_.clear();
-    views_.clear();
-    bool all = true;
-    for (const RowOf& wanted : rows_) {
-      if (wanted.segment->access() != Access::read_write || words_.size() == kMaxFutexWords) {
-        all = false;
-        continue;
-      }
-      const auto seen = register_for_row(*wanted.segment, wanted.row);
-      if (!seen) return;
-      views_.push_back(&wanted.segment->view());
-      words_.push_back({.word = &views_.back()->wakes().row_wake, .expected = *seen});
-    }
-    if (!all) at_most = std::min(at_most, kGlance);
-    if (words_.empty() || !futex_wait_any(words_, at_most)) nap(at_most);
-    // several may have been woken through this one
-    for (std::size_t i = 0; i < words_.size(); ++i) pass_on_wake(*views_[i], words_[i].expected);
-  }
-
- private:
-  std::span<const RowOf> rows_;
-  std::vector<FutexWord> words_;
-  std::vector<const SegmentView*> views_;
-};
-
 }  // namespace
 
 Waited wait_for_first_row(std::span<const RowOf> rows, const Deadline& deadline,
@@ -73,10 +39,28 @@ Waited wait_for_first_row(std::span<const RowOf> rows, const Deadline& deadline,
         std::ranges::find_if(rows, [](const RowOf& wanted) { return wanted.segment->gone(); });
     if (gone != rows.end() && !ready()) gone->segment->throw_if_gone();
   };
-  Sleep sleep(rows);
+  std::vector<FutexWord> words;
+  std::vector<const SegmentView*> views;
+  // one sleep, which any of the rows ends
+  const auto sleep = [&](std::int64_t at_most) {
+    words.clear();
+    views.clear();
+    for (const RowOf& wanted : rows) {
+      if (wanted.segment->access() != Access::read_write || words.size() == kMaxFutexWords)
+        continue;
+      const auto seen = register_for_row(*wanted.segment, wanted.row);
+      if (!seen) return;
+      views.push_back(&wanted.segment->view());
+      words.push_back({.word = &views.back()->wakes().row_wake, .expected = *seen});
+    }
+    if (words.size() < rows.size()) at_most = std::min(at_most, kGlance);
+    if (words.empty() || !futex_wait_any(words, at_most)) nap(at_most);
+    // several may have been woken through this one
+    for (std::size_t i = 0; i < words.size(); ++i) pass_on_wake(*views[i], words[i].expected);
+  };
   std::int64_t poll_at = monotonic_now() + kSlice;
   while (!deadline.over()) {
-    sleep.sleep(deadline.left(std::max<std::int64_t>(0, poll_at - monotonic_now())));
+    sleep(deadline.left(std::max<std::int64_t>(0, poll_at - monotonic_now())));
     if (ready()) return Waited::ready;
     if (monotonic_now() < poll_at && std::ranges::none_of(rows, has_ended)) continue;
     poll_at = monotonic_now() + kSlice;

@@ -18,8 +18,7 @@ class HistoryWriter {
  public:
   explicit HistoryWriter(const SegmentView& view) noexcept;
 
-  std::size_t row_bytes() const noexcept { return row_bytes_; }
-  /// Publishes row k, which must be one more than the last; `row` is private memory of row_bytes().
+  /// Publishes row k, which must be one more than the last, from private memory.
   void publish(Iteration k, const std::byte* row) noexcept;
   /// The next row is k, later than the last one plus one: the rows between are missing, and the
   /// rows before them are no longer read. Until row k is published readers find no row but the

@@ -93,23 +93,6 @@ void LaneSender::count_in() {
   page_->incarnation.store(incarnation_, std::memory_order_release);  // sync incarnation
 }
 
-LaneSender::LaneSender(LaneSender&& other) noexcept
-    : segment_(other.segment_),
-      view_(other.view_),
-      lock_(std::move(other.lock_)),
-      lane_(other.lane_),
-      page_(other.page_),
-      feedback_(other.feedback_),
-      statuses_(other.statuses_),
-      transport_(other.transport_),
-      incarnation_(other.incarnation_),
-      sent_(other.sent_),
-      next_id_(other.next_id_),
-      draws_(other.draws_),
-      slice_(other.slice_),
-      watched_(other.watched_),
-      guard_(other.guard_) {}
-
 LaneSender::~LaneSender() { give_back(); }
 
 void LaneSender::give_back() noexcept {
@@ -153,11 +136,6 @@ void LaneSender::draw_ids(std::uint64_t next) noexcept {
 
 std::uint64_t LaneSender::send(std::span<const std::byte> batch, std::size_t ticket_offset) {
   if (guard_.forked()) guard_.check("segment '" + segment_->name() + "'");
-  if (batch.empty() || batch.size() % kBlockSize != 0 || ticket_offset % 8 != 0 ||
-      ticket_offset >= kBlockSize)
-    throw InvalidArgument(
-        "a batch must consist of whole blocks of 64 bytes, with its ticket in "
-        "the first");
   const std::uint64_t count = batch.size() / kBlockSize;
   const std::uint32_t free = free_blocks();
   if (count > free) throw lane_full(segment_->name(), count, free, blocks());

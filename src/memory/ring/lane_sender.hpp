@@ -21,8 +21,8 @@ inline constexpr std::int64_t kShortestSlice = 100'000;  // between signs of lif
 LaneFull lane_full(std::string_view segment, std::uint64_t needed, std::uint32_t free,
                    std::uint32_t most);
 
-/// Move-only: a lane owned by a frontend (src/memory/README.md#lanes). The destructor releases it;
-/// the kernel does if the process dies.
+/// Neither movable nor copyable: a lane owned by a frontend (src/memory/README.md#lanes). The
+/// destructor releases it; the kernel does if the process dies.
 ///
 /// Ids and positions continue where the former owner stopped.
 ///
@@ -46,7 +46,6 @@ class LaneSender {
   /// Acquires the first free lane of a segment attached with Access::read_write. The segment must
   /// outlive it. Throws NoLane (with the owners of the lanes), ReadOnly, UsedAfterFork.
   explicit LaneSender(const AttachedSegment& segment);
-  LaneSender(LaneSender&& other) noexcept;
   LaneSender& operator=(LaneSender&&) = delete;
   ~LaneSender();
 
@@ -67,7 +66,7 @@ class LaneSender {
   std::uint64_t statuses() const noexcept { return 2 * std::uint64_t{blocks()}; }
   /// Copies a batch of whole blocks, draws its ticket, writes the ticket at `ticket_offset` (a
   /// multiple of 8) of the first block, commits all with one store, and rings the bell. Returns the
-  /// ticket. Throws LaneFull (nothing is sent), InvalidArgument, UsedAfterFork.
+  /// ticket. Throws LaneFull (nothing is sent), UsedAfterFork.
   std::uint64_t send(std::span<const std::byte> batch, std::size_t ticket_offset);
 
   /// Cancels the burst of the batch `id`: it ends after the present iteration, or before its first.

@@ -17,7 +17,8 @@ LockFile create_anonymous();
 /// sweep_orphans() would remove, and unlinks it at once.
 LockFile create_unlinked();
 
-/// Opens an open file once more. The result has its own locks and may be mapped.
+/// Opens an open file once more, also if it has no name any more. The result has its own locks and
+/// may be mapped.
 LockFile open_again(const LockFile& file, int flags);
 
 /// Gives an open file a name; false, with errno set, on failure (EEXIST: the name is in use).

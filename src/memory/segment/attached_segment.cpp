@@ -11,6 +11,7 @@
 
 #include "memory/os/atomic_words.hpp"
 #include "memory/os/file_owner.hpp"
+#include "memory/segment/anonymous_file.hpp"
 #include "memory/segment/owned_segment.hpp"
 #include "memory/segment/segment_file.hpp"
 #include "memory/segment/segment_name.hpp"
@@ -152,56 +153,33 @@ void AttachedSegment::map_commands() {
                          view_.shape.page_bytes);
 }
 
-/// Polls the name for attach() until its segment fits the options.
-class SegmentSearch {
- public:
-  SegmentSearch(std::string_view name, Access access, const AttachOptions& options)
-      : name_(name), access_(access), options_(options), path_(segment_path(name)) {}
-
-  /// True if found() fits. Throws BackendFailed.
-  bool poll() {
-    if (!found_ || !is_path_of(path_, found_->descriptor()))
-      found_ = AttachedSegment::open(name_, access_, reason_);
-    if (!found_) return false;
-    if (found_->epoch() == options_.ignore_epoch) {
-      reason_ = "no new backend has started";
-      return false;
-    }
-    const Life life = found_->life();
-    if (life == Life::running) return true;
-    if (life == Life::starting && options_.starting) return true;
-    if (life == Life::starting) {
-      reason_ = starting_text(*found_);
-      return false;
-    }
-    if (options_.dead == AttachOptions::Dead::accept) return true;
-    if (life == Life::failed) found_->throw_gone(life);
-    reason_ = std::string("its last backend was ") + name_of(life) +
-              ", and no new one has started. Start it again; until then its history can be read";
-    return false;
-  }
-
-  AttachedSegment found() { return std::move(*found_); }
-  /// Why there is none, and what to do about it.
-  std::string reason() const { return found_ ? reason_ : reason_ + ". " + other_segments(name_); }
-
- private:
-  std::string_view name_;
-  Access access_;
-  const AttachOptions& options_;
-  std::string path_;
-  std::optional<AttachedSegment> found_;
-  std::string reason_;
-};
-
 AttachedSegment AttachedSegment::attach(std::string_view name, Access access,
                                         const Deadline& deadline, const AttachOptions& options) {
-  SegmentSearch search(name, access, options);
+  const std::string path = segment_path(name);
+  std::optional<AttachedSegment> found;
+  std::string reason;  // why `found` does not fit
+  const auto fits = [&] {
+    if (!found || !is_path_of(path, found->descriptor())) found = open(name, access, reason);
+    if (!found) return false;
+    const Life life = found->life();
+    if (life == Life::running) return true;
+    if (life == Life::starting && options.starting) return true;
+    if (life == Life::starting) {
+      reason = starting_text(*found);
+      return false;
+    }
+    if (options.dead) return true;
+    if (life == Life::failed) found->throw_gone(life);
+    reason = std::string("its last backend was ") + name_of(life) +
+             ", and no new one has started. Start it again; until then its history can be read";
+    return false;
+  };
   for (int polls = 0;; ++polls) {
-    if (search.poll()) return search.found();
+    if (fits()) return *std::move(found);
     if (deadline.over())
       throw TimeoutError(segment_called(name) + " has no running backend" +
-                         (polls == 0 ? ": " : " within the time given: ") + search.reason() + ".");
+                         (polls == 0 ? ": " : " within the time given: ") + reason +
+                         (found ? "" : ". " + other_segments(name)) + ".");
     if (polls % kPollsBetweenChecks == 0 && options.keep_waiting && !options.keep_waiting())
       throw Cancelled("the wait for " + segment_called(name) + " was cancelled");
     usleep(static_cast<useconds_t>(std::max<std::int64_t>(deadline.left(kPoll) / 1000, 1)));
@@ -308,9 +286,7 @@ void AttachedSegment::check_process() const {
 
 LockFile AttachedSegment::open_commands_again() const {
   check_process();
-  // by descriptor, because the file may be unlinked already
-  const std::string path = "/proc/self/fd/" + std::to_string(commands_descriptor());
-  LockFile file = LockFile::open(path, O_RDWR);
+  LockFile file = open_again(commands_, O_RDWR);
   if (!file.is_open())
     throw SegmentError(segment_called(name_) + " cannot be opened again: " + std::strerror(errno));
   return file;

@@ -22,10 +22,8 @@ namespace o80 {
 class OwnedSegment;
 
 struct AttachOptions {
-  enum class Dead { wait, accept };
-  Dead dead = Dead::wait;          // accept: also attach to the segment of an ended backend
-  bool starting = false;           // true: also attach to a backend without row 0
-  std::uint64_t ignore_epoch = 0;  // ignore the segment of this epoch
+  bool dead = false;      // also attach to the segment of an ended backend
+  bool starting = false;  // also attach to a backend without row 0
   KeepWaiting keep_waiting = {};
 };
 
@@ -86,7 +84,6 @@ class AttachedSegment {
 
  private:
   AttachedSegment() = default;
-  friend class SegmentSearch;
   void throw_gone(Life life) const;
   /// Empty, with a `reason`, if there is no such segment now. Throws SegmentError, ReadOnly.
   static std::optional<AttachedSegment> open(std::string_view name, Access access,

@@ -211,11 +211,7 @@ LaneLiveness::LaneLiveness(const OwnedSegment& segment)
   LivenessThread::add(watched_.get());
 }
 
-LaneLiveness::LaneLiveness(LaneLiveness&&) noexcept = default;
-
-LaneLiveness::~LaneLiveness() {
-  if (watched_) LivenessThread::remove(watched_.get());
-}
+LaneLiveness::~LaneLiveness() { LivenessThread::remove(watched_.get()); }
 
 std::uint32_t LaneLiveness::changes() const noexcept {
   return watched_->changes.load(std::memory_order_acquire);  // sync changes

@@ -16,7 +16,7 @@ struct LaneLife {
   friend bool operator==(const LaneLife&, const LaneLife&) = default;
 };
 
-/// Move-only: knows for each lane of a segment whether its owner is alive.
+/// Neither movable nor copyable: knows for each lane of a segment whether its owner is alive.
 ///
 /// One helper thread for each process queries the locks of all its segments every 20 ms. It does
 /// not run on the processors of avoid_processors(). It has ordinary scheduling, unless a real-time
@@ -29,7 +29,6 @@ struct LaneLife {
 class LaneLiveness {
  public:
   explicit LaneLiveness(const OwnedSegment& segment);
-  LaneLiveness(LaneLiveness&&) noexcept;
   LaneLiveness& operator=(LaneLiveness&&) = delete;
   ~LaneLiveness();
 

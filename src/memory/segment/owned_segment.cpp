@@ -204,25 +204,11 @@ void OwnedSegment::publish(const std::string& name) {
   take_back();
 }
 
-OwnedSegment& OwnedSegment::operator=(OwnedSegment&& other) noexcept {
-  if (this == &other) return *this;
-  release();
-  name_ = std::move(other.name_);
-  path_ = std::move(other.path_);
-  commands_path_ = std::move(other.commands_path_);
-  epoch_ = other.epoch_;
-  mapping_ = std::move(other.mapping_);
-  commands_mapping_ = std::move(other.commands_mapping_);
-  query_ = std::move(other.query_);
-  lock_ = std::move(other.lock_);
-  commands_lock_ = std::move(other.commands_lock_);
-  socket_ = std::move(other.socket_);
-  view_ = other.view_;
-  guard_ = other.guard_;
-  return *this;
+OwnedSegment::~OwnedSegment() {
+  if (!lock_.is_open() || guard_.forked()) return;
+  end_if_alive();
+  if (state() != BackendState::failed) remove();
 }
-
-OwnedSegment::~OwnedSegment() { release(); }
 
 void OwnedSegment::end_and_remove() noexcept {
   if (!lock_.is_open() || guard_.forked()) return;
@@ -233,19 +219,6 @@ void OwnedSegment::end_and_remove() noexcept {
 void OwnedSegment::end_if_alive() noexcept {
   if (state() == BackendState::starting || state() == BackendState::running)
     end(BackendState::stopped);
-}
-
-void OwnedSegment::release() noexcept {
-  if (lock_.is_open() && !guard_.forked()) {
-    end_if_alive();
-    if (state() != BackendState::failed) remove();
-  }
-  mapping_ = Mapping();
-  commands_mapping_ = Mapping();
-  query_.close();
-  socket_.close();
-  lock_.close();
-  commands_lock_.close();
 }
 
 BackendState OwnedSegment::state() const noexcept {

@@ -55,7 +55,7 @@ class OwnedSegment {
   void publish(const std::string& name);
 
   OwnedSegment(OwnedSegment&&) noexcept = default;
-  OwnedSegment& operator=(OwnedSegment&& other) noexcept;
+  OwnedSegment& operator=(OwnedSegment&&) = delete;
   /// Ends as stopped unless it has ended, and removes the files. The files of a failed backend
   /// stay, so that a later attach can report the reason.
   ~OwnedSegment();
@@ -87,18 +87,18 @@ class OwnedSegment {
   OwnedSegment() = default;
 
   void end_if_alive() noexcept;
-  void release() noexcept;
 
   std::string name_;
   std::string path_;           // empty while it is anonymous
   std::string commands_path_;  // empty while it is anonymous
   std::uint64_t epoch_ = 0;
-  LockFile lock_;           // the segment file: holds the lock of byte 0, not mapped
+  // in this order, because the deciding lock is released last
   LockFile commands_lock_;  // the commanders' file: holds the lock of byte 0, not mapped
-  LockFile query_;          // the commanders' file: mapped, without a lock
+  LockFile lock_;           // the segment file: holds the lock of byte 0, not mapped
   NameSocket socket_;
-  Mapping mapping_;
+  LockFile query_;  // the commanders' file: mapped, without a lock
   Mapping commands_mapping_;
+  Mapping mapping_;
   SegmentView view_;
   ForkGuard guard_;
 };

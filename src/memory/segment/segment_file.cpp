@@ -104,23 +104,9 @@ mode_t commanders_mode(mode_t permission) noexcept {
 }
 
 const char* name_of(Life life) noexcept {
-  switch (life) {
-    case Life::starting:
-      return "starting";
-    case Life::running:
-      return "running";
-    case Life::stopped:
-      return "stopped";
-    case Life::failed:
-      return "failed";
-    case Life::superseded:
-      return "superseded";
-    case Life::killed:
-      return "killed";
-    case Life::unknown:
-      break;
-  }
-  return "unknown";
+  constexpr const char* kNames[] = {"starting",   "running", "stopped", "failed",
+                                    "superseded", "killed",  "unknown"};
+  return kNames[static_cast<std::size_t>(life)];
 }
 
 const char* SegmentState::word() const noexcept {
@@ -133,19 +119,11 @@ const char* SegmentState::word() const noexcept {
 Life life_of(int descriptor, const std::atomic<std::uint32_t>& state) noexcept {
   // load the state after the lock: a backend stores its end before it releases the lock
   const bool held = is_byte_locked(descriptor, kBackendByte);
-  switch (static_cast<BackendState>(state.load(std::memory_order_acquire))) {  // sync state
-    case BackendState::stopped:
-      return Life::stopped;
-    case BackendState::failed:
-      return Life::failed;
-    case BackendState::superseded:
-      return Life::superseded;
-    case BackendState::starting:
-      return held ? Life::starting : Life::killed;
-    case BackendState::running:
-      break;
-  }
-  return held ? Life::running : Life::killed;
+  const auto stored = static_cast<Life>(state.load(std::memory_order_acquire));  // sync state
+  if (stored == Life::stopped || stored == Life::failed || stored == Life::superseded)
+    return stored;
+  if (!held) return Life::killed;
+  return stored == Life::starting ? Life::starting : Life::running;
 }
 
 void end_segment(const SegmentView& view, BackendState state) noexcept {

@@ -14,11 +14,9 @@ namespace o80 {
 
 namespace {
 constexpr Iteration kNoWish = std::numeric_limits<Iteration>::max();
-constexpr std::int64_t kMargin = 10'000;  // of the expected time of a row [ns]
+constexpr std::int64_t kMargin = 10'000;   // of the expected time of a row [ns]
+constexpr std::int64_t kPoll = 1'000'000;  // interval of a read-only waiter [ns]
 }  // namespace
-
-RowWaiter::RowWaiter(const AttachedSegment& segment, std::int64_t poll) noexcept
-    : segment_(&segment), view_(segment.view()), poll_(std::max<std::int64_t>(poll, 1000)) {}
 
 Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline,
                                const KeepWaiting& keep_waiting) {
@@ -109,7 +107,7 @@ void RowWaiter::poll(Iteration k, std::int64_t at_most) noexcept {
   const Counters& counters = view_.counters();
   const std::int64_t end = monotonic_now() + at_most;
   for (std::int64_t left = at_most; left > 0; left = end - monotonic_now()) {
-    usleep(static_cast<useconds_t>(std::min(left, poll_) / 1000));
+    usleep(static_cast<useconds_t>(std::min(left, kPoll) / 1000));
     if (counters.published.load(std::memory_order_acquire) >= k) return;  // sync published
     if (segment_->has_ended()) return;
   }
@@ -167,8 +165,6 @@ bool BellWaiter::wait(std::uint32_t seen, std::int64_t at_most) noexcept {
   sleeping.store(0, std::memory_order_relaxed);
   return rang();
 }
-
-void BellWaiter::interrupt() noexcept { ring_bell(view_); }
 
 void ring_bell(const SegmentView& view) noexcept {
   Bell& bell = view.bell();

@@ -34,8 +34,8 @@ void pass_on_wake(const SegmentView& view, std::uint32_t seen) noexcept;
 /// Realtime: no.
 class RowWaiter {
  public:
-  /// `poll`: interval of a read-only waiter [ns].
-  explicit RowWaiter(const AttachedSegment& segment, std::int64_t poll = 1'000'000) noexcept;
+  explicit RowWaiter(const AttachedSegment& segment) noexcept
+      : segment_(&segment), view_(segment.view()) {}
 
   /// Waits until row k is published. Throws BackendGone (any kind) and Cancelled.
   Waited wait_for_row(Iteration k, const Deadline& deadline, const KeepWaiting& keep_waiting = {});
@@ -48,7 +48,6 @@ class RowWaiter {
 
   const AttachedSegment* segment_;
   SegmentView view_;
-  std::int64_t poll_;
   Spinner spinner_;
 };
 
@@ -73,7 +72,7 @@ class RowSignal {
 
 /// Blocks the backend until a frontend has committed a batch.
 ///
-/// Writer:   every LaneSender; `interrupt` from any thread or signal handler of the backend.
+/// Writer:   ring_bell, from any thread or signal handler.
 /// Readers:  the backend's thread.
 /// Realtime: no, unless the bell has rung already.
 class BellWaiter {
@@ -83,8 +82,6 @@ class BellWaiter {
   /// Waits until the bell is no longer `seen`, at most `at_most` [ns] and at most kSlice; true if
   /// it has rung.
   bool wait(std::uint32_t seen, std::int64_t at_most = kSlice) noexcept;
-  /// Wakes the backend's thread, to stop it.
-  void interrupt() noexcept;
 
  private:
   SegmentView view_;
@@ -102,7 +99,8 @@ struct Sleepers {
 /// Realtime: yes.
 void wake_sleepers(const SegmentView& view, Sleepers sleepers) noexcept;
 
-/// Rings the bell; a system call only if the backend sleeps.
+/// Rings the bell: a batch is committed, a halt requested, or the backend is to stop. A system call
+/// only if it sleeps.
 void ring_bell(const SegmentView& view) noexcept;
 
 }  // namespace o80

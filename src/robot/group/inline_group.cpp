@@ -14,7 +14,7 @@
 #include "memory/segment/signal.hpp"
 #include "robot/group/descriptor_limit.hpp"
 #include "runtime/frontend/link.hpp"
-#include "runtime/frontend/sent.hpp"
+#include "runtime/frontend/sending.hpp"
 
 namespace o80 {
 

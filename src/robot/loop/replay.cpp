@@ -2,8 +2,8 @@
 
 #include <utility>
 
+#include "memory/segment/owned_segment.hpp"
 #include "o80/base/error.hpp"
-#include "runtime/journal/recorded_entry_check.hpp"
 
 namespace o80 {
 
@@ -20,8 +20,8 @@ void check_simulated(const Schema& schema) {
 
 }  // namespace
 
-Replay::Replay(std::unique_ptr<DriverInstance> robot, BackendOptions options)
-    : lanes_(options.lanes), loop_(std::move(robot), replaying(std::move(options)), &recorded_) {
+Replay::Replay(std::unique_ptr<DriverInstance> robot, const BackendOptions& options)
+    : loop_(std::move(robot), options, &recorded_) {
   check_simulated(loop_.backend().schema());
 }
 
@@ -43,8 +43,8 @@ void Replay::load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes)
 }
 
 void Replay::add(const JournalEntry& entry) {
-  check_recorded(entry, loop_.backend().schema(), lanes_);
-  recorded_.add(entry);
+  const UntypedBackend& backend = loop_.backend();
+  recorded_.add(entry, backend.schema(), backend.segment().view().shape.lanes);
 }
 
 bool Replay::run(std::span<const std::int64_t> times) {

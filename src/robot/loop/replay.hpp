@@ -23,7 +23,7 @@ class Replay {
  public:
   /// `options`: those of the recorded run, with another segment name. Throws as Loop, and
   /// DriverError, before the robot is started, if it may be hardware.
-  Replay(std::unique_ptr<DriverInstance> robot, BackendOptions options);
+  Replay(std::unique_ptr<DriverInstance> robot, const BackendOptions& options);
 
   /// Begins at this iteration instead of row 0: `run` first publishes the row before it, which
   /// shows the start state, and obeys the decisions of this iteration and later ones. Call it
@@ -50,7 +50,6 @@ class Replay {
   Iteration next() const noexcept { return loop_.backend().iteration(); }
 
  private:
-  std::uint32_t lanes_;
   RecordedDecisions recorded_;
   Loop loop_;
   std::vector<std::byte> desired_;

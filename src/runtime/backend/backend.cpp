@@ -24,6 +24,13 @@ std::size_t largest_request(const Schema& schema) {
   return size;
 }
 
+/// Options for a backend that nobody halts or reads the journal of.
+BackendOptions replaying(BackendOptions options) {
+  options.resume = true;  // halts come from the recording
+  options.journal = 0;
+  return options;
+}
+
 }  // namespace
 
 UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options,
@@ -85,7 +92,7 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
 void UntypedBackend::Body::watch() noexcept {
   commanders.poll_liveness();
   halts.watch();
-  start_afresh_after_request();
+  if (running.any()) start_afresh_after_request();
 }
 
 /// Batches => queues, within the budget of an iteration; none during a burst.
@@ -275,8 +282,7 @@ void UntypedBackend::Body::end(BackendState state, std::string_view text) noexce
   bursts.end();
   intake.reject_all(Reason::stopped);
   outbox.report_no_row();
-  controller.purge(kEveryActuator, current, Reason::stopped);
-  drop_running({Status::purged, Reason::stopped});
+  purge_to_stop();
   while (!controller.finish_pending()) {
   }
   wake_sleepers(segment.view(), {.lanes = lanes.announce()});
@@ -289,7 +295,9 @@ void UntypedBackend::Body::end(BackendState state, std::string_view text) noexce
 
 UntypedBackend::UntypedBackend(Schema schema, const BackendOptions& options, RequestServer* server,
                                RecordedDecisions* recorded)
-    : body_(std::make_unique<Body>(std::move(schema), options, server, recorded)) {}
+    : body_(std::make_unique<Body>(std::move(schema),
+                                   recorded == nullptr ? options : replaying(options), server,
+                                   recorded)) {}
 
 UntypedBackend::~UntypedBackend() {
   body_->end(failure().empty() ? BackendState::stopped : BackendState::failed, failure());
@@ -353,7 +361,8 @@ void UntypedBackend::halt(HaltCause cause, std::string_view text) noexcept {
 const Halt& UntypedBackend::halted() const noexcept { return body_->halts.halt(); }
 
 void UntypedBackend::end_request(std::uint32_t request, const Served& how) noexcept {
-  body_->end_request(request, how);
+  if (how.kind == Served::Kind::running) return body_->running.show_progress(request, how.why());
+  body_->running.note_end(request, how);
 }
 void UntypedBackend::show_progress(std::uint32_t request, std::string_view text) noexcept {
   body_->running.show_progress(request, text);
@@ -367,7 +376,7 @@ void UntypedBackend::interrupt(std::uint32_t actuator) noexcept { body_->interru
 
 void UntypedBackend::ask_to_stop() noexcept {
   body_->stop.store(true, std::memory_order_relaxed);
-  body_->bell.interrupt();
+  ring_bell(body_->segment.view());
 }
 bool UntypedBackend::stop_asked() const noexcept {
   return body_->stop.load(std::memory_order_relaxed);

@@ -61,7 +61,6 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler, publi
   Step step(std::int64_t at_most) noexcept;
   bool begin_direct(const DirectBurst& burst) noexcept;
   void end(BackendState state, std::string_view text) noexcept;
-  void end_request(std::uint32_t request, const Served& how) noexcept;
   Step brake() noexcept;
   void interrupt(std::uint32_t actuator) noexcept;
   bool acts() const noexcept { return shown_acts_ != 0 || controller.active() || running.moves(); }

@@ -186,9 +186,4 @@ void UntypedBackend::Body::start_afresh_after_request() noexcept {
   });
 }
 
-void UntypedBackend::Body::end_request(std::uint32_t request, const Served& how) noexcept {
-  if (how.kind == Served::Kind::running) return running.show_progress(request, how.why());
-  running.note_end(request, how);
-}
-
 }  // namespace o80

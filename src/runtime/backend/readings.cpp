@@ -84,7 +84,9 @@ bool Readings::judge_against_first() noexcept {
 }
 
 bool Readings::read_again(FreshReading& reading, Judged judged, ShortText<248>& why) noexcept {
-  keep();
+  std::byte* const observed = core_.row() + core_.layout.observed;
+  auto* const last = reinterpret_cast<std::byte*>(last_row_.data());
+  std::copy_n(observed, core_.layout.block, last);
   reading.may_fail = true;
   if (!reads_fresh(reading)) {
     why.add(reading.why.empty() ? "the robot could not be read" : reading.why);
@@ -96,7 +98,7 @@ bool Readings::read_again(FreshReading& reading, Judged judged, ShortText<248>& 
         judged == Judged::all || (judged == Judged::readings && !reading.has_desired);
     if (!is_judged || !is_misread(reading.observed, kToResume, why)) return true;
   }
-  put_back();
+  std::copy_n(last, core_.layout.block, observed);
   return false;
 }
 
@@ -153,16 +155,6 @@ bool Readings::may_begin(std::uint32_t actuator, std::uint32_t lane, CommandId i
 
 double Readings::since_reading() const noexcept {
   return static_cast<double>(std::max(core_.time() - read_at_, core_.schema.head.period)) * 1e-9;
-}
-
-void Readings::keep() noexcept {
-  if (core_.layout.block > 0)
-    std::memcpy(last_row_.data(), core_.row() + core_.layout.observed, core_.layout.block);
-}
-
-void Readings::put_back() noexcept {
-  if (core_.layout.block > 0)
-    std::memcpy(core_.row() + core_.layout.observed, last_row_.data(), core_.layout.block);
 }
 
 }  // namespace o80

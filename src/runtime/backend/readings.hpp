@@ -73,8 +73,6 @@ class Readings {
   bool judge_against_first() noexcept;
   void add_followed(bool fresh) noexcept;
   double since_reading() const noexcept;
-  void keep() noexcept;
-  void put_back() noexcept;
 
   BackendCore& core_;
   ReadingWatch watch_;

@@ -12,7 +12,7 @@
 #include "o80/runtime/not_completed.hpp"
 #include "runtime/frontend/ends_text.hpp"
 #include "runtime/frontend/link.hpp"
-#include "runtime/frontend/sent.hpp"
+#include "runtime/frontend/sending.hpp"
 
 namespace o80 {
 
@@ -325,9 +325,9 @@ void Batch::throw_unless_completed() const {
     const CommandId id = record_id(id_, place);
     const LaneSender::StatusAnswer answer = lane_->status(id);
     const bool is_known = answer.known == LaneSender::Known::yes;
-    if (is_known && is_success(static_cast<Status>(answer.word.status))) continue;
+    if (is_known && static_cast<Status>(answer.word.status) == Status::completed) continue;
     const Handle handle = ask(id);
-    if (is_success(handle.status) || handle.status == Status::forgotten) continue;
+    if (handle.status == Status::completed || handle.status == Status::forgotten) continue;
     const std::span<const SentCommand> command = kept_->commands_of(place);
     const bool is_overwritten = handle.status == Status::overwritten;
     if (is_overwritten && link_->has_replaced(id, handle.iteration, command)) continue;

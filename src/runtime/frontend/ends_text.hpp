@@ -10,9 +10,6 @@
 
 namespace o80 {
 
-/// True for the end of a command that reached its target, or of a request that was served.
-constexpr bool is_success(Status status) noexcept { return status == Status::completed; }
-
 /// Names of the actuators of a command; empty for a request.
 std::vector<std::string> names_of(const Schema& schema, std::span<const SentCommand> command);
 

@@ -11,19 +11,13 @@
 
 namespace o80 {
 
-UntypedFrontend::UntypedFrontend(const std::string& segment, const FrontendOptions& options) {
-  AttachOptions attach;
-  attach.dead = options.dead ? AttachOptions::Dead::accept : AttachOptions::Dead::wait;
-  attach.starting = options.starting;
-  attach.keep_waiting = options.keep_waiting;
-  link_ = std::make_shared<Link>(
-      AttachedSegment::attach(segment, options.access, Deadline(options.timeout), attach), nullptr);
-}
-
-UntypedFrontend::UntypedFrontend(const std::string& segment, std::shared_ptr<InlineRunner> runner)
+UntypedFrontend::UntypedFrontend(const std::string& segment, const FrontendOptions& options)
     : link_(std::make_shared<Link>(
-          AttachedSegment::attach(segment, Access::read_write, Deadline(std::chrono::seconds(5))),
-          std::move(runner))) {}
+          AttachedSegment::attach(segment, options.access, Deadline(options.timeout),
+                                  {.dead = options.dead,
+                                   .starting = options.starting,
+                                   .keep_waiting = options.keep_waiting}),
+          nullptr)) {}
 
 UntypedFrontend::UntypedFrontend(const UntypedBackend& backend,
                                  std::shared_ptr<InlineRunner> runner)
@@ -120,13 +114,6 @@ SegmentError Link::damaged() const {
                       "' is damaged: its counters contradict each other. Start its backend again.");
 }
 
-void UntypedFrontend::missing(Iteration k) const {
-  throw RowOverwritten("row " + std::to_string(k) + " of '" + segment() +
-                       "' was overwritten: the oldest one is " +
-                       std::to_string(link_->history.oldest()) + " (the history keeps " +
-                       std::to_string(link_->history.rows()) + " rows)");
-}
-
 void UntypedFrontend::wait_for(Iteration k, std::byte* row, Timeout timeout,
                                const KeepWaiting& keep_waiting) const {
   link_->check_usable();
@@ -140,7 +127,11 @@ void UntypedFrontend::wait_for(Iteration k, std::byte* row, Timeout timeout,
                          (bursting() ? " and waits for a burst" : ""));
     }
   }
-  if (!link_->history.read(k, row)) missing(k);
+  if (link_->history.read(k, row)) return;
+  throw RowOverwritten("row " + std::to_string(k) + " of '" + segment() +
+                       "' was overwritten: the oldest one is " +
+                       std::to_string(link_->history.oldest()) + " (the history keeps " +
+                       std::to_string(link_->history.rows()) + " rows)");
 }
 
 UntypedObservation UntypedFrontend::wait_for(Iteration k, Timeout timeout,

@@ -7,7 +7,7 @@
 
 #include "o80/runtime/frontend.hpp"
 #include "runtime/frontend/link.hpp"
-#include "runtime/frontend/sent.hpp"
+#include "runtime/frontend/sending.hpp"
 
 namespace o80 {
 
@@ -27,6 +27,56 @@ class CancelUnlessDone {
   LaneSender* lane_;
   CommandId id_;
 };
+
+void refuse_burst(const Link& link, std::int64_t iterations) {
+  link.check_usable();
+  const std::string& segment = link.segment.name();
+  if (link.description->schema.head.bursting == 0) {
+    throw NotBursting("'" + segment +
+                      (is_played(link.segment)
+                           ? "' is played by time: play the recording with --bursts"
+                           : "' runs in real time and cannot be burst: start it with bursting"));
+  }
+  if (iterations < 1) {
+    throw InvalidArgument("the iterations of a burst of '" + segment +
+                          "' must be at least 1, got " + std::to_string(iterations));
+  }
+}
+
+Sent send_burst(Link& link, BatchBuilder& builder, std::int64_t iterations,
+                const PulseOptions& options, Statuses statuses) {
+  refuse_burst(link, iterations);
+  BatchRecord record = batch_of(options);
+  record.burst = iterations;
+  return send(link, builder, record, options.seen, statuses);
+}
+
+/// Sends a burst, calls `meanwhile`, and waits; returns the iteration of its last row. As
+/// start_burst(iterations).wait(timeout, keep_waiting), without the allocations of a Burst.
+template <class Meanwhile>
+Iteration run_burst(const std::shared_ptr<Link>& link, BatchBuilder& builder,
+                    std::int64_t iterations, Timeout timeout, const KeepWaiting& keep_waiting,
+                    const PulseOptions& options, Meanwhile&& meanwhile) {
+  const Sent sent = send_burst(*link, builder, iterations, options, Statuses::unread);
+  CancelUnlessDone rest(sent.lane.get(), sent.id);
+  meanwhile();
+  const Iteration last =
+      wait_for_burst(*link, *sent.lane, sent.id, timeout, keep_waiting, sent.events_before_send);
+  rest.done();
+  link->check_usable();  // a close of this frontend ends its burst too
+  if (last < 0) Burst(link, Batch(link, sent)).wait(timeout, keep_waiting);  // says why
+  return last;
+}
+
+/// Throws what start_burst would throw, or if the backend has gone, as far as it can be known now.
+void refuse_unless_ready(Link& link, std::int64_t iterations, const std::optional<Seen>& seen) {
+  refuse_burst(link, iterations);
+  const auto lock = link.lock_to_send();
+  link.segment.throw_if_gone();
+  BatchRecord wanted;
+  wanted.burst = iterations;
+  refuse_unless_sendable(link, link.builder, wanted, seen);
+}
 
 }  // namespace
 
@@ -61,52 +111,25 @@ Iteration UntypedFrontend::wait_until_ended(const Batch& batch, Timeout timeout,
   return last;
 }
 
-void UntypedFrontend::refuse_burst(std::int64_t iterations) const {
-  link_->check_usable();
-  if (!bursting()) {
-    throw NotBursting("'" + segment() +
-                      (is_played(link_->segment)
-                           ? "' is played by time: play the recording with --bursts"
-                           : "' runs in real time and cannot be burst: start it with bursting"));
-  }
-  if (iterations < 1) {
-    throw InvalidArgument("the iterations of a burst of '" + segment() +
-                          "' must be at least 1, got " + std::to_string(iterations));
-  }
-}
-
-Sent UntypedFrontend::send_burst(BatchBuilder& builder, std::int64_t iterations,
-                                 const PulseOptions& options, Requested requested) {
-  refuse_burst(iterations);
-  BatchRecord record = batch_of(options);
-  record.burst = iterations;
-  return send(builder, record, options.seen, requested);
-}
-
 Burst UntypedFrontend::start_burst(std::int64_t iterations, const PulseOptions& options) {
-  return {link_, Batch(link_, send_burst(link_->builder, iterations, options, Requested::yes))};
+  return {link_,
+          Batch(link_, send_burst(*link_, link_->builder, iterations, options, Statuses::noted))};
 }
 
 UntypedObservation UntypedFrontend::burst(std::int64_t iterations, Timeout timeout,
                                           const KeepWaiting& keep_waiting,
                                           const PulseOptions& options) {
-  return burst(link_->builder, iterations, timeout, keep_waiting, options);
+  return burst_of(link_, link_->builder, iterations, timeout, keep_waiting, options);
 }
 
-UntypedObservation UntypedFrontend::burst(BatchBuilder& builder, std::int64_t iterations,
-                                          Timeout timeout, const KeepWaiting& keep_waiting,
-                                          const PulseOptions& options) {
-  // start_burst(iterations).wait(timeout, keep_waiting) without the allocations of a Burst
-  const Sent sent = send_burst(builder, iterations, options, Requested::no);
-  CancelUnlessDone rest(sent.lane.get(), sent.id);
-  UntypedObservation observation(link_->description);  // made while the backend works
-  const Iteration row =
-      wait_for_burst(*link_, *sent.lane, sent.id, timeout, keep_waiting, sent.events_before_send);
-  rest.done();
-  link_->check_usable();  // a close of this frontend ends its burst too
-  if (row < 0) return Burst(link_, Batch(link_, sent)).wait(timeout, keep_waiting);  // says why
-  read_last_row(*link_, row, observation);
-  return observation;
+UntypedObservation burst_of(const std::shared_ptr<Link>& link, BatchBuilder& builder,
+                            std::int64_t iterations, Timeout timeout,
+                            const KeepWaiting& keep_waiting, const PulseOptions& options) {
+  std::optional<UntypedObservation> observation;
+  const Iteration last = run_burst(link, builder, iterations, timeout, keep_waiting, options,
+                                   [&] { observation.emplace(link->description); });
+  read_last_row(*link, last, *observation);
+  return *std::move(observation);
 }
 
 Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout,
@@ -118,14 +141,8 @@ Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout
                           "' do not fit into its history of " +
                           std::to_string(link_->history.rows()));
   }
-  const Sent sent =
-      send_burst(link_->builder, static_cast<std::int64_t>(count), options, Requested::no);
-  CancelUnlessDone rest(sent.lane.get(), sent.id);
-  const Iteration last =
-      wait_for_burst(*link_, *sent.lane, sent.id, timeout, keep_waiting, sent.events_before_send);
-  rest.done();
-  link_->check_usable();
-  if (last < 0) Burst(link_, Batch(link_, sent)).wait(timeout, keep_waiting);  // says why
+  const Iteration last = run_burst(link_, link_->builder, static_cast<std::int64_t>(count), timeout,
+                                   keep_waiting, options, [] {});
   const Iteration first = last + 1 - static_cast<Iteration>(count);
   if (link_->history.read_range(first, count, rows.data()).count != count) {
     throw RowOverwritten("rows " + std::to_string(first) + " to " + std::to_string(last) + " of '" +
@@ -136,26 +153,12 @@ Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout
 
 // ------------------------------------------------------------------------------ groups
 
-/// Throws what start_burst would throw, or if the backend has gone, as far as it can be known now.
-void UntypedFrontend::refuse_unless_ready(std::int64_t iterations,
-                                          const std::optional<Seen>& seen) {
-  refuse_burst(iterations);
-  const auto lock = link_->lock_to_send();
-  if (link_->runner) link_->runner->refuse_nested();
-  link_->segment.throw_if_gone();
-  BatchRecord wanted;
-  wanted.burst = iterations;
-  link_->builder.set_seen(seen);
-  refuse_if_too_much(link_->builder);
-  refuse_if_full(link_->builder, wanted, *link_->lane());
-}
-
 std::vector<Burst> start_bursts(std::span<const BurstMember> group,
                                 const std::optional<Seen>& seen) {
   std::set<const Link*> members;
   for (const auto& [frontend, iterations] : group) {
-    frontend->refuse_unless_ready(iterations, seen);
-    if (!members.insert(frontend->link_.get()).second) {
+    refuse_unless_ready(*frontend->link(), iterations, seen);
+    if (!members.insert(frontend->link().get()).second) {
       throw InvalidArgument("the frontend of '" + frontend->segment() +
                             "' is in the group twice: give each frontend once");
     }

@@ -9,13 +9,6 @@
 
 namespace o80 {
 
-namespace {
-Timeout left_of(const Deadline& deadline, Timeout timeout) {
-  if (!timeout) return {};
-  return std::chrono::nanoseconds(deadline.left(timeout->count()));
-}
-}  // namespace
-
 std::uint64_t UntypedFrontend::halt(std::string_view reason) {
   link_->check_usable();
   if (link_->segment.access() != Access::read_write) {
@@ -58,7 +51,7 @@ bool UntypedFrontend::resume(std::uint64_t number, Timeout timeout, const KeepWa
     BatchBuilder builder;
     builder.resume(number, accept_reading);
     const Batch batch = pulse(builder);
-    batch.wait(left_of(deadline, timeout), keep_waiting, {.check = false});
+    batch.wait_for_row(deadline, keep_waiting);
     const Handle handle = batch.handle(0);
     if (handle.status == Status::completed) return true;
     // at rest, the backend may still have scheduled batches to end

@@ -5,7 +5,7 @@
 
 #include "o80/runtime/frontend.hpp"
 #include "runtime/frontend/goal.hpp"
-#include "runtime/frontend/link.hpp"
+#include "runtime/frontend/sending.hpp"
 
 namespace o80 {
 
@@ -51,7 +51,7 @@ Move UntypedFrontend::start_move(std::span<const std::uint32_t> actuators,
   BatchBuilder builder;
   {
     const auto lock = link_->lock_to_add();
-    add_commands_to(builder, actuators, states, options.command, masks);
+    add_commands_to(*link_, builder, actuators, states, options.command, masks);
   }
   move.goal_ = std::make_shared<const Move::Goal>(schema(), actuators, states, masks, options);
   move.batch_ = pulse(builder);
@@ -119,7 +119,7 @@ UntypedObservation UntypedFrontend::burst_to(const Move& move, Timeout timeout,
   BatchBuilder nothing;
   while (true) {
     poll();
-    UntypedObservation row = burst(nothing, 1, each, keep_waiting, {});
+    UntypedObservation row = burst_of(link_, nothing, 1, each, keep_waiting, {});
     const bool ended = move.batch_.ended();
     if (ended) move.batch_.throw_unless_completed();
     std::vector<Miss> misses = move.goal_->misses(row);

@@ -7,7 +7,7 @@
 #include "base/short_text.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "runtime/frontend/link.hpp"
-#include "runtime/frontend/sent.hpp"
+#include "runtime/frontend/sending.hpp"
 #include "runtime/protocol/schedule_limits.hpp"
 
 namespace o80 {
@@ -35,12 +35,13 @@ std::string seconds_text(std::int64_t nanoseconds) {
   return text.str();
 }
 
+void check_range(const char* name, std::int64_t value, std::int64_t low, std::int64_t high) {
+  if (value >= low && value <= high) return;
+  throw InvalidArgument(std::string(name) + " must be from " + std::to_string(low) + " to " +
+                        std::to_string(high) + ", got " + std::to_string(value));
+}
+
 void check_pace(const PaceSpec& pace, std::uint32_t rows) {
-  const auto check = [&pace](const std::string& name, std::int64_t low, std::int64_t high) {
-    if (pace.amount >= low && pace.amount <= high) return;
-    throw InvalidArgument(name + " must be from " + std::to_string(low) + " to " +
-                          std::to_string(high) + ", got " + std::to_string(pace.amount));
-  };
   const auto check_time = [&pace](const std::string& name) {
     if (pace.amount >= 0 && pace.amount <= kLongestDuration) return;
     throw InvalidArgument(name + " must be from 0 to " + seconds_text(kLongestDuration) + ", got " +
@@ -56,9 +57,9 @@ void check_pace(const PaceSpec& pace, std::uint32_t rows) {
     case Pace::duration:
       return check_time("duration");
     case Pace::iterations:
-      return check("iterations", 1, kMaxIterations);
+      return check_range("iterations", pace.amount, 1, kMaxIterations);
     case Pace::until:
-      if (rows == 1) return check("until", 0, kMaxIterations);
+      if (rows == 1) return check_range("until", pace.amount, 0, kMaxIterations);
       throw InvalidArgument("until is for one target: for a trajectory give iterations or times");
   }
 }
@@ -107,16 +108,11 @@ void check_times(std::span<const std::int64_t> times, std::uint32_t rows, std::i
 }
 
 void check_chunk(std::span<const std::uint32_t> due, const ChunkOptions& options) {
-  const auto check = [](const char* name, std::int64_t value, std::int64_t low, std::int64_t high) {
-    if (value >= low && value <= high) return;
-    throw InvalidArgument(std::string(name) + " must be from " + std::to_string(low) + " to " +
-                          std::to_string(high) + ", got " + std::to_string(value));
-  };
   const auto rows = static_cast<std::int64_t>(due.size());
-  check("the number of rows of a chunk", rows, 1, kMaxChunkRows);
-  check("first (the first row to play)", options.first, 0, rows - 1);
-  check("ease [iterations]", options.ease, 0, kLatestDue);
-  check("the anchor", options.anchor, -std::int64_t{kLatestDue}, kMaxIterations);
+  check_range("the number of rows of a chunk", rows, 1, kMaxChunkRows);
+  check_range("first (the first row to play)", options.first, 0, rows - 1);
+  check_range("ease [iterations]", options.ease, 0, kLatestDue);
+  check_range("the anchor", options.anchor, -std::int64_t{kLatestDue}, kMaxIterations);
   std::int64_t before = 0;
   for (std::size_t i = 0; i < due.size(); before = due[i++]) {
     if (due[i] > before && due[i] <= kLatestDue) continue;
@@ -129,16 +125,11 @@ void check_chunk(std::span<const std::uint32_t> due, const ChunkOptions& options
                         std::string(to_text(options.profile)));
 }
 
-}  // namespace
-
-// ------------------------------------------------------------------------------ adding
-
-RecordHead UntypedFrontend::checked_command(std::uint32_t actuator,
-                                            std::span<const std::byte> state,
-                                            const CommandOptions& options,
-                                            std::span<const std::uint64_t> mask) const {
-  const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
-  link_->command_check.targets(index, state, mask);
+RecordHead checked_command(const CommandCheck& check, std::uint32_t actuator,
+                           std::span<const std::byte> state, const CommandOptions& options,
+                           std::span<const std::uint64_t> mask) {
+  const std::uint32_t index = check.actuator(std::int64_t{actuator});
+  check.targets(index, state, mask);
   check_options(options);
   if (options.profile && is_of_rows(*options.profile)) {
     throw InvalidArgument("the profile " + std::string(to_text(*options.profile)) +
@@ -146,38 +137,22 @@ RecordHead UntypedFrontend::checked_command(std::uint32_t actuator,
   }
   const PaceSpec& pace = options.pace;
   check_pace(pace, 1);
-  if (pace.pace == Pace::speed) link_->command_check.speed(index, pace.per_second, mask);
-  if (pace.pace == Pace::fastest) link_->command_check.fastest(index, mask);
-  if (pace.pace == Pace::direct) link_->command_check.direct(index, state, mask);
-  return head_of(index, options, link_->command_check.usual_profile(index));
-}
-
-std::uint32_t UntypedFrontend::add_command(std::uint32_t actuator, std::span<const std::byte> state,
-                                           const CommandOptions& options,
-                                           std::span<const std::uint64_t> mask) {
-  const RecordHead head = checked_command(actuator, state, options, mask);
-  const auto lock = link_->lock_to_add();
-  return link_->builder.command(head, mask, {}, 1, state);
-}
-
-std::uint32_t UntypedFrontend::add_commands(std::span<const std::uint32_t> actuators,
-                                            std::span<const std::byte> states,
-                                            const CommandOptions& options,
-                                            std::span<const std::uint64_t> masks) {
-  const auto lock = link_->lock_to_add();
-  return add_commands_to(link_->builder, actuators, states, options, masks);
+  if (pace.pace == Pace::speed) check.speed(index, pace.per_second, mask);
+  if (pace.pace == Pace::fastest) check.fastest(index, mask);
+  if (pace.pace == Pace::direct) check.direct(index, state, mask);
+  return head_of(index, options, check.usual_profile(index));
 }
 
 /// Throws InvalidArgument unless the actuators are there, each once, with a mask for each or none.
-void UntypedFrontend::check_actuators(std::span<const std::uint32_t> actuators,
-                                      std::span<const std::uint64_t> masks) const {
+void check_actuators(const Link& link, std::span<const std::uint32_t> actuators,
+                     std::span<const std::uint64_t> masks) {
   if (actuators.empty()) throw InvalidArgument("a command needs at least one actuator");
   std::size_t words = 0;
   for (std::size_t i = 0; i < actuators.size(); ++i) {
-    const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuators[i]});
-    words += link_->command_check.words_of_mask(index);
+    const std::uint32_t index = link.command_check.actuator(std::int64_t{actuators[i]});
+    words += link.command_check.words_of_mask(index);
     if (std::ranges::count(actuators.first(i), index) == 0) continue;
-    throw InvalidArgument("actuator '" + schema().actuators[index].name.str() +
+    throw InvalidArgument("actuator '" + link.description->schema.actuators[index].name.str() +
                           "' is named twice: one command gives it one target");
   }
   if (!masks.empty()) refuse_size("masks", actuators.size(), masks.size(), words, "words");
@@ -186,63 +161,33 @@ void UntypedFrontend::check_actuators(std::span<const std::uint32_t> actuators,
 /// Calls `visit` with each actuator, the states of its rows and its mask. The last one gets all
 /// states that are left: the check of its targets says what is wrong with them.
 template <class Visit>
-void UntypedFrontend::each_share(std::span<const std::uint32_t> actuators, std::uint32_t rows,
-                                 std::span<const std::byte> states,
-                                 std::span<const std::uint64_t> masks, Visit&& visit) const {
+void each_share(const CommandCheck& check, std::span<const std::uint32_t> actuators,
+                std::uint32_t rows, std::span<const std::byte> states,
+                std::span<const std::uint64_t> masks, Visit&& visit) {
   for (const std::uint32_t& actuator : actuators) {
-    const std::size_t size = std::size_t{rows} * link_->command_check.layout(actuator).size();
+    const std::size_t size = std::size_t{rows} * check.layout(actuator).size();
     const bool is_last = &actuator == &actuators.back();
     const auto own = states.first(is_last ? states.size() : std::min(size, states.size()));
-    const auto mask = masks.first(masks.empty() ? 0 : link_->command_check.words_of_mask(actuator));
+    const auto mask = masks.first(masks.empty() ? 0 : check.words_of_mask(actuator));
     visit(actuator, own, mask);
     states = states.subspan(own.size());
     masks = masks.subspan(mask.size());
   }
 }
 
-std::uint32_t UntypedFrontend::add_commands_to(BatchBuilder& builder,
-                                               std::span<const std::uint32_t> actuators,
-                                               std::span<const std::byte> states,
-                                               const CommandOptions& options,
-                                               std::span<const std::uint64_t> masks) const {
-  check_actuators(actuators, masks);
-  std::size_t bytes = 0;
-  for (const std::uint32_t actuator : actuators) {
-    bytes += link_->command_check.layout(actuator).size();
-  }
-  refuse_size("states", actuators.size(), states.size(), bytes, "bytes");
-
-  link_->members.clear();
-  Profile profile = Profile::linear;
-  each_share(actuators, 1, states, masks, [&](std::uint32_t actuator, auto state, auto mask) {
-    const RecordHead head = checked_command(actuator, state, options, mask);
-    if (head.profile == Profile::minimum_jerk) profile = Profile::minimum_jerk;
-    link_->members.push_back({head, mask, state});
-  });
-  // all members use one profile: minimum_jerk if one of them needs it
-  for (BatchBuilder::Member& member : link_->members) member.head.profile = profile;
-  if (link_->members.size() == 1) {
-    const BatchBuilder::Member& only = link_->members.front();
-    return builder.command(only.head, only.mask, {}, 1, only.states);
-  }
-  return builder.group(link_->members);
-}
-
 /// Checks a trajectory; returns its options with the pace that follows from its times.
-CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::uint32_t rows,
-                                                   std::span<const std::byte> states,
-                                                   const CommandOptions& options,
-                                                   std::span<const std::int64_t> times,
-                                                   std::span<const std::uint64_t> mask) const {
-  const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
+CommandOptions checked_trajectory(const Link& link, std::uint32_t actuator, std::uint32_t rows,
+                                  std::span<const std::byte> states, const CommandOptions& options,
+                                  std::span<const std::int64_t> times,
+                                  std::span<const std::uint64_t> mask) {
   if (rows == 0) throw InvalidArgument("the trajectory has no row");
   check_options(options);
-  link_->command_check.targets(index, states, mask);
+  link.command_check.targets(actuator, states, mask);
   CommandOptions paced = options;
   // a trajectory always has a pace
   if (paced.pace.pace == Pace::direct) paced.pace = iterations(1);
   if (!times.empty()) {
-    check_times(times, rows, link_->description->schema.head.period);
+    check_times(times, rows, link.description->schema.head.period);
     paced.pace = duration(std::chrono::nanoseconds(times.back()));
   } else if (paced.pace.pace == Pace::duration && rows > 1) {
     throw InvalidArgument("a trajectory at a duration needs the times of its rows");
@@ -255,9 +200,60 @@ CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::
   }
   check_pace(paced.pace, rows);
   if (paced.pace.pace == Pace::speed)
-    link_->command_check.speed(index, paced.pace.per_second, mask);
-  if (paced.pace.pace == Pace::fastest) link_->command_check.fastest(index, mask);
+    link.command_check.speed(actuator, paced.pace.per_second, mask);
+  if (paced.pace.pace == Pace::fastest) link.command_check.fastest(actuator, mask);
   return paced;
+}
+
+/// Adds the command of Link::members.
+std::uint32_t add_members(const Link& link, BatchBuilder& builder,
+                          std::span<const std::int64_t> times = {}, std::uint32_t rows = 1) {
+  if (link.members.size() > 1) return builder.group(link.members, times, rows);
+  const BatchBuilder::Member& only = link.members.front();
+  return builder.command(only.head, only.mask, times, rows, only.states);
+}
+
+}  // namespace
+
+// ------------------------------------------------------------------------------ adding
+
+std::uint32_t UntypedFrontend::add_command(std::uint32_t actuator, std::span<const std::byte> state,
+                                           const CommandOptions& options,
+                                           std::span<const std::uint64_t> mask) {
+  const RecordHead head = checked_command(link_->command_check, actuator, state, options, mask);
+  const auto lock = link_->lock_to_add();
+  return link_->builder.command(head, mask, {}, 1, state);
+}
+
+std::uint32_t UntypedFrontend::add_commands(std::span<const std::uint32_t> actuators,
+                                            std::span<const std::byte> states,
+                                            const CommandOptions& options,
+                                            std::span<const std::uint64_t> masks) {
+  const auto lock = link_->lock_to_add();
+  return add_commands_to(*link_, link_->builder, actuators, states, options, masks);
+}
+
+std::uint32_t add_commands_to(Link& link, BatchBuilder& builder,
+                              std::span<const std::uint32_t> actuators,
+                              std::span<const std::byte> states, const CommandOptions& options,
+                              std::span<const std::uint64_t> masks) {
+  const CommandCheck& check = link.command_check;
+  check_actuators(link, actuators, masks);
+  std::size_t bytes = 0;
+  for (const std::uint32_t actuator : actuators) bytes += check.layout(actuator).size();
+  refuse_size("states", actuators.size(), states.size(), bytes, "bytes");
+
+  link.members.clear();
+  Profile profile = Profile::linear;
+  each_share(check, actuators, 1, states, masks,
+             [&](std::uint32_t actuator, auto state, auto mask) {
+               const RecordHead head = checked_command(check, actuator, state, options, mask);
+               if (head.profile == Profile::minimum_jerk) profile = Profile::minimum_jerk;
+               link.members.push_back({head, mask, state});
+             });
+  // all members use one profile: minimum_jerk if one of them needs it
+  for (BatchBuilder::Member& member : link.members) member.head.profile = profile;
+  return add_members(link, builder);
 }
 
 std::uint32_t UntypedFrontend::add_trajectory(std::uint32_t actuator, std::uint32_t rows,
@@ -273,22 +269,17 @@ std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> a
                                                 const CommandOptions& options,
                                                 std::span<const std::int64_t> times,
                                                 std::span<const std::uint64_t> masks) {
-  check_actuators(actuators, masks);
-  CommandOptions paced = options;
-  each_share(actuators, rows, states, masks, [&](std::uint32_t actuator, auto own, auto mask) {
-    paced = checked_trajectory(actuator, rows, own, options, times, mask);
-  });
-  const std::span<const std::int64_t> ends = rows > 1 ? times : std::span<const std::int64_t>{};
+  check_actuators(*link_, actuators, masks);
   const auto lock = link_->lock_to_add();
-  if (actuators.size() == 1) {
-    return link_->builder.command(head_of(actuators[0], paced, Profile::linear), masks, ends, rows,
-                                  states);
-  }
   link_->members.clear();
-  each_share(actuators, rows, states, masks, [&](std::uint32_t actuator, auto own, auto mask) {
-    link_->members.push_back({head_of(actuator, paced, Profile::linear), mask, own});
-  });
-  return link_->builder.group(link_->members, ends, rows);
+  each_share(link_->command_check, actuators, rows, states, masks,
+             [&](std::uint32_t actuator, auto own, auto mask) {
+               const CommandOptions paced =
+                   checked_trajectory(*link_, actuator, rows, own, options, times, mask);
+               link_->members.push_back({head_of(actuator, paced, Profile::linear), mask, own});
+             });
+  return add_members(*link_, link_->builder, rows > 1 ? times : std::span<const std::int64_t>{},
+                     rows);
 }
 
 BatchBuilder& UntypedFrontend::own_builder() { return link_->builder; }
@@ -299,7 +290,7 @@ std::uint32_t UntypedFrontend::add_chunk(BatchBuilder& batch,
                                          std::span<const std::byte> states,
                                          const ChunkOptions& options,
                                          std::span<const std::uint64_t> masks) {
-  check_actuators(actuators, masks);
+  check_actuators(*link_, actuators, masks);
   check_chunk(due, options);
   const auto rows = static_cast<std::uint32_t>(due.size());
   const ChunkHead chunk{.epoch = epoch(),
@@ -314,35 +305,38 @@ std::uint32_t UntypedFrontend::add_chunk(BatchBuilder& batch,
   std::vector<const StateLayout*> layouts;
   const auto lock = link_->lock_to_add();
   link_->members.clear();
-  each_share(actuators, rows, states, masks, [&](std::uint32_t actuator, auto own, auto mask) {
-    link_->command_check.targets(actuator, own, mask);
-    RecordHead head;
-    head.actuator = static_cast<std::uint16_t>(actuator);
-    head.profile = options.profile;
-    layouts.push_back(&link_->command_check.layout(actuator));
-    if (own.size() != due.size() * layouts.back()->size()) {
-      throw InvalidArgument("a chunk needs a state for each of its " + std::to_string(rows) +
-                            " rows");
-    }
-    link_->members.push_back({head, mask, own});
-  });
+  each_share(link_->command_check, actuators, rows, states, masks,
+             [&](std::uint32_t actuator, auto own, auto mask) {
+               link_->command_check.targets(actuator, own, mask);
+               RecordHead head;
+               head.actuator = static_cast<std::uint16_t>(actuator);
+               head.profile = options.profile;
+               layouts.push_back(&link_->command_check.layout(actuator));
+               if (own.size() != due.size() * layouts.back()->size()) {
+                 throw InvalidArgument("a chunk needs a state for each of its " +
+                                       std::to_string(rows) + " rows");
+               }
+               link_->members.push_back({head, mask, own});
+             });
   return batch.chunk(link_->members, chunk, due, layouts);
 }
 
 void UntypedFrontend::add_set_points(std::span<const std::uint32_t> actuators, std::uint32_t rows,
                                      std::span<const std::byte> states, Mode mode) {
-  check_actuators(actuators, {});
-  each_share(actuators, rows, states, {}, [&](std::uint32_t actuator, auto targets, auto) {
-    link_->command_check.targets(actuator, targets);
-  });
+  check_actuators(*link_, actuators, {});
+  each_share(link_->command_check, actuators, rows, states, {},
+             [&](std::uint32_t actuator, auto targets, auto) {
+               link_->command_check.targets(actuator, targets);
+             });
   const auto lock = link_->lock_to_add();
-  each_share(actuators, rows, states, {}, [&](std::uint32_t actuator, auto targets, auto) {
-    RecordHead head;
-    head.actuator = static_cast<std::uint16_t>(actuator);
-    head.mode = mode;
-    head.profile = link_->command_check.usual_profile(actuator);
-    link_->builder.command(head, {}, {}, rows, targets);
-  });
+  each_share(link_->command_check, actuators, rows, states, {},
+             [&](std::uint32_t actuator, auto targets, auto) {
+               RecordHead head;
+               head.actuator = static_cast<std::uint16_t>(actuator);
+               head.mode = mode;
+               head.profile = link_->command_check.usual_profile(actuator);
+               link_->builder.command(head, {}, {}, rows, targets);
+             });
 }
 
 std::uint32_t UntypedFrontend::add_close_plan(std::uint64_t plan) {
@@ -409,21 +403,9 @@ bool has_begun(const LaneSender& lane, CommandId batch) {
   return lane.status(batch).known != LaneSender::Known::not_yet;
 }
 
-}  // namespace
-
-BatchRecord UntypedFrontend::batch_of(const PulseOptions& options) {
-  if (options.at != kNow && options.at < 0) {
-    throw InvalidArgument("at must be at least iteration 0, got " + std::to_string(options.at));
-  }
-  BatchRecord record;
-  record.at = options.at;
-  record.late_now = options.late == PulseOptions::Late::now ? 1 : 0;
-  return record;
-}
-
 /// Refuses a batch with too many requests or orders, which would make the iteration that takes it
 /// too long.
-void UntypedFrontend::refuse_if_too_much(const BatchBuilder& builder) const {
+void refuse_if_too_much(const Link& link, const BatchBuilder& builder) {
   const auto refuse = [&](std::uint32_t count, std::uint32_t most, const char* what) {
     if (count <= most) return;
     throw InvalidArgument("a batch can have at most " + std::to_string(most) + " " + what +
@@ -434,60 +416,60 @@ void UntypedFrontend::refuse_if_too_much(const BatchBuilder& builder) const {
   refuse(builder.requests(), kMaxRequests, "requests");
   refuse(builder.orders(), kMaxOrders, "orders to take or release control, or to close plans");
 
-  const std::uint64_t journal = link_->segment.view().shape.journal_bytes;
+  const std::uint64_t journal = link.segment.view().shape.journal_bytes;
   const std::uint64_t bytes = builder.blocks() * kBlockBytes;
   if (journal == 0 || bytes <= journal / 2) return;
   throw InvalidArgument(
-      "this batch takes " + std::to_string(bytes) + " bytes, and the journal of '" + segment() +
-      "' allows " + std::to_string(journal / 2) +
+      "this batch takes " + std::to_string(bytes) + " bytes, and the journal of '" +
+      link.segment.name() + "' allows " + std::to_string(journal / 2) +
       " (half of its size). Send the commands in several pulses, or start the "
       "robot with a larger journal (--journal). Nothing was sent, all stays added "
       "(forget_added() drops it)");
 }
 
 /// Refuses a batch for a later iteration if too many of them wait already.
-void UntypedFrontend::refuse_if_too_many_wait(Iteration at, const LaneSender& lane) {
+void refuse_if_too_many_wait(Link& link, Iteration at, const LaneSender& lane) {
   if (at == kNow) return;
-  std::erase_if(link_->scheduled, [&](const Link::Scheduled& sent) {
-    return sent.at <= link_->history.published() || has_begun(lane, sent.id);
+  std::erase_if(link.scheduled, [&](const Link::Scheduled& sent) {
+    return sent.at <= link.history.published() || has_begun(lane, sent.id);
   });
   const auto refuse = [&](std::size_t there, std::uint32_t most, const std::string& of) {
     if (there < most) return;
-    throw LaneFull("'" + segment() + "' has " + std::to_string(most) +
+    throw LaneFull("'" + link.segment.name() + "' has " + std::to_string(most) +
                    " batches of this frontend that wait for " + of +
                    ", the maximum. Nothing was "
                    "sent, all stays added: put several commands into one batch, or pulse later");
   };
-  const auto same = std::ranges::count(link_->scheduled, at, &Link::Scheduled::at);
+  const auto same = std::ranges::count(link.scheduled, at, &Link::Scheduled::at);
   refuse(static_cast<std::size_t>(same), kMaxScheduledAt, "iteration " + std::to_string(at));
-  refuse(link_->scheduled.size(), kMaxScheduled, "later iterations");
+  refuse(link.scheduled.size(), kMaxScheduled, "later iterations");
 }
 
 /// Refuses a batch that does not fit into the lane. Checked before ids are drawn: ids that are
 /// never sent would overwrite the statuses of other batches.
-void UntypedFrontend::refuse_if_full(const BatchBuilder& builder, const BatchRecord& wanted,
-                                     const LaneSender& lane) const {
+void refuse_if_full(const Link& link, const BatchBuilder& builder, const BatchRecord& wanted,
+                    const LaneSender& lane) {
   const std::uint64_t needed = builder.blocks();
   // commands leave some blocks free for a burst, a purge or a request
   const bool stays = does_stay(builder, wanted);
   const std::uint32_t most = lane.blocks() - (stays ? kept_free(lane.blocks()) : 0);
   const std::uint32_t sent = lane.blocks() - lane.free_blocks();
   const std::uint32_t free = most - std::min(sent, most);
-  if (needed > free) throw lane_full(segment(), needed, free, most);
+  if (needed > free) throw lane_full(link.segment.name(), needed, free, most);
 }
 
 /// Draws ids whose status slots are free.
-CommandId UntypedFrontend::draw_ids(LaneSender& lane, std::uint64_t n, bool stays) {
+CommandId draw_ids(Link& link, LaneSender& lane, std::uint64_t n, bool stays) {
   const auto has_ended = [&](CommandId id) {
     const LaneSender::StatusAnswer answer = lane.status(id);
     return answer.known == LaneSender::Known::forgotten ||
            (answer.known == LaneSender::Known::yes &&
             is_end(static_cast<Status>(answer.word.status)));
   };
-  const std::optional<CommandId> first = stays ? link_->ids.draw(lane.next_id(), n, has_ended)
-                                               : link_->ids.draw_kept(lane.next_id(), n, has_ended);
+  const std::optional<CommandId> first = stays ? link.ids.draw(lane.next_id(), n, has_ended)
+                                               : link.ids.draw_kept(lane.next_id(), n, has_ended);
   if (!first) {
-    throw LaneFull("the batches in the lane of '" + segment() +
+    throw LaneFull("the batches in the lane of '" + link.segment.name() +
                    "' that have not ended leave no status slots for " + std::to_string(n - 2) +
                    " more records. Nothing was sent, all stays added: wait for a batch, purge, or "
                    "start the backend with larger lanes (lane_blocks)");
@@ -495,6 +477,8 @@ CommandId UntypedFrontend::draw_ids(LaneSender& lane, std::uint64_t n, bool stay
   lane.draw_ids(*first + n);
   return *first;
 }
+
+}  // namespace
 
 /// What a batch says about the row by which it was decided: also, which iteration was the newest
 /// then.
@@ -517,35 +501,52 @@ std::optional<Seen> Link::with_newest_row(const std::optional<Seen>& seen) const
   return sent;
 }
 
-/// Seals a batch, sends it, and lets an inline robot take it.
-Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted,
-                           const std::optional<Seen>& seen, Requested requested) {
+BatchRecord batch_of(const PulseOptions& options) {
+  if (options.at != kNow && options.at < 0) {
+    throw InvalidArgument("at must be at least iteration 0, got " + std::to_string(options.at));
+  }
+  BatchRecord record;
+  record.at = options.at;
+  record.late_now = options.late == PulseOptions::Late::now ? 1 : 0;
+  return record;
+}
+
+std::shared_ptr<LaneSender> refuse_unless_sendable(Link& link, BatchBuilder& builder,
+                                                   const BatchRecord& wanted,
+                                                   const std::optional<Seen>& seen) {
+  if (link.runner) link.runner->refuse_nested();
+  if (builder.records() > 0) refuse_if_played(link.segment);
+  std::shared_ptr<LaneSender> lane = link.lane();
+  link.segment.throw_if_known_gone();
+  builder.set_seen(seen);
+  refuse_if_too_much(link, builder);
+  refuse_if_too_many_wait(link, wanted.at, *lane);
+  refuse_if_full(link, builder, wanted, *lane);
+  return lane;
+}
+
+Sent send(Link& link, BatchBuilder& builder, const BatchRecord& wanted,
+          const std::optional<Seen>& seen, Statuses statuses) {
   Sent sent;
-  sent.seen = link_->with_newest_row(seen);
+  sent.seen = link.with_newest_row(seen);
   std::shared_ptr<InlineRunner> runner;
   {
-    const auto lock = link_->lock_to_send();
-    runner = link_->runner;
-    if (runner) runner->refuse_nested();
-    if (builder.records() > 0) refuse_if_played(link_->segment);
-    sent.lane = link_->lane();
-    LaneSender* const lane = sent.lane.get();
-    link_->segment.throw_if_known_gone();
-    builder.set_seen(sent.seen);
-    refuse_if_too_much(builder);
-    refuse_if_too_many_wait(wanted.at, *lane);
-    refuse_if_full(builder, wanted, *lane);
+    const auto lock = link.lock_to_send();
+    if (builder.empty() && wanted.burst == 0) return sent;
+    runner = link.runner;
+    sent.lane = refuse_unless_sendable(link, builder, wanted, sent.seen);
+    LaneSender& lane = *sent.lane;
     BatchRecord record = wanted;
     const std::uint32_t records = builder.records();
-    sent.events_before_send = lane->events();
-    record.id = draw_ids(*lane, std::uint64_t{records} + 2, does_stay(builder, wanted));
+    sent.events_before_send = lane.events();
+    record.id = draw_ids(link, lane, std::uint64_t{records} + 2, does_stay(builder, wanted));
     const std::span<const Block> blocks = builder.seal(record);
-    link_->sent_commands.note(blocks, requested == Requested::yes ? &sent.commands : nullptr);
-    lane->send(std::as_bytes(blocks), offsetof(BatchRecord, ticket));
+    link.sent_commands.note(blocks, statuses == Statuses::noted ? &sent.commands : nullptr);
+    lane.send(std::as_bytes(blocks), offsetof(BatchRecord, ticket));
     sent.clipped = builder.clipped();
     builder.clear();
-    if (records > 0) link_->ids.sent(record.id, std::uint64_t{records} + 2);
-    if (record.at != kNow) link_->scheduled.push_back({record.at, record.id});
+    if (records > 0) link.ids.sent(record.id, std::uint64_t{records} + 2);
+    if (record.at != kNow) link.scheduled.push_back({record.at, record.id});
     sent.id = record.id;
     sent.records = records;
   }
@@ -553,30 +554,30 @@ Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted,
   return sent;
 }
 
-Batch UntypedFrontend::pulse(const PulseOptions& options, std::uint16_t flags) {
-  BatchRecord record = batch_of(options);
+namespace {
+Batch pulsed(const std::shared_ptr<Link>& link, BatchBuilder& builder, BatchRecord record,
+             const std::optional<Seen>& seen, std::uint16_t flags = 0) {
   record.flags = flags;
-  {
-    const auto lock = link_->lock_to_send();
-    if (link_->builder.empty()) return {};
-  }
-  return {link_, send(link_->builder, record, options.seen)};
+  Sent sent = send(*link, builder, record, seen);
+  return sent.lane ? Batch(link, std::move(sent)) : Batch();
+}
+}  // namespace
+
+Batch UntypedFrontend::pulse(const PulseOptions& options) {
+  return pulsed(link_, link_->builder, batch_of(options), options.seen);
 }
 
 Batch UntypedFrontend::pulse(BatchBuilder& batch, const std::optional<Seen>& seen) {
-  link_->check_usable();
-  return batch.empty() ? Batch() : Batch(link_, send(batch, {}, seen));
+  return pulsed(link_, batch, {}, seen);
 }
 
 Batch UntypedFrontend::pulse_to_end(const PulseOptions& options) {
-  return pulse(options, bursting() ? kBurstUntilEnded : std::uint16_t{0});
+  return pulsed(link_, link_->builder, batch_of(options), options.seen,
+                bursting() ? kBurstUntilEnded : std::uint16_t{0});
 }
 
 Batch UntypedFrontend::pulse_to_end(BatchBuilder& batch, const std::optional<Seen>& seen) {
-  link_->check_usable();
-  BatchRecord record;
-  if (bursting()) record.flags = kBurstUntilEnded;
-  return batch.empty() ? Batch() : Batch(link_, send(batch, record, seen));
+  return pulsed(link_, batch, {}, seen, bursting() ? kBurstUntilEnded : std::uint16_t{0});
 }
 
 }  // namespace o80

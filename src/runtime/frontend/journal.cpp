@@ -16,53 +16,51 @@ std::uint64_t bytes_of_lanes(const SegmentShape& shape) {
 
 }  // namespace
 
-class Journal::Body {
- public:
-  explicit Body(std::shared_ptr<Link> link)
-      : link_(std::move(link)),
-        reader_(link_->segment.view()),
-        decoder_(link_->description, bytes_of_lanes(link_->segment.view().shape)) {
-    // the name of an owner may stand behind an entry that it caused, because names are repeated
-    JournalReader names = reader_;
-    // bounded: a fast writer adds entries meanwhile
-    const std::uint64_t most = link_->segment.view().shape.journal_bytes / sizeof(JournalHead);
-    for (std::uint64_t i = 0; i < most && names.next(decoder_.item()); ++i) decoder_.note_name();
-  }
+struct Journal::Body {
+  explicit Body(std::shared_ptr<Link> of)
+      : link(std::move(of)),
+        reader(link->segment.view()),
+        decoder(link->description, bytes_of_lanes(link->segment.view().shape)) {}
 
-  bool exists() const { return reader_.has_journal(); }
-  bool next(JournalEntry& entry) {
-    link_->check_usable();
-    while (!decoder_.next(entry)) {
-      if (!reader_.next(decoder_.item())) return false;
-      decoder_.take();
-    }
-    return true;
-  }
-  void seek(std::uint64_t number) {
-    // from the oldest entry on: blocks of a batch lie before the decision on it
-    reader_ = JournalReader(link_->segment.view());
-    decoder_.start_at(number);
-  }
-  void seek_end() {
-    reader_.seek_end();
-    decoder_.start_at(0);
-  }
-
- private:
-  std::shared_ptr<Link> link_;
-  JournalReader reader_;
-  JournalDecoder decoder_;
+  std::shared_ptr<Link> link;
+  JournalReader reader;
+  JournalDecoder decoder;
 };
 
-Journal::Journal(const UntypedFrontend& frontend)
-    : body_(std::make_unique<Body>(frontend.link())) {}
+Journal::Journal(const UntypedFrontend& frontend) : body_(std::make_unique<Body>(frontend.link())) {
+  // the name of an owner may stand behind an entry that it caused, because names are repeated
+  JournalReader names = body_->reader;
+  JournalDecoder& decoder = body_->decoder;
+  // bounded: a fast writer adds entries meanwhile
+  const std::uint64_t most = body_->link->segment.view().shape.journal_bytes / sizeof(JournalHead);
+  for (std::uint64_t i = 0; i < most && names.next(decoder.item()); ++i) decoder.note_name();
+}
+
 Journal::Journal(Journal&&) noexcept = default;
 Journal& Journal::operator=(Journal&&) noexcept = default;
 Journal::~Journal() = default;
 
-bool Journal::exists() const { return body_->exists(); }
-bool Journal::next(JournalEntry& entry) { return body_->next(entry); }
-void Journal::seek(std::uint64_t number) { body_->seek(number); }
-void Journal::seek_end() { body_->seek_end(); }
+bool Journal::exists() const { return body_->reader.has_journal(); }
+
+bool Journal::next(JournalEntry& entry) {
+  auto& [link, reader, decoder] = *body_;
+  link->check_usable();
+  while (!decoder.next(entry)) {
+    if (!reader.next(decoder.item())) return false;
+    decoder.take();
+  }
+  return true;
+}
+
+void Journal::seek(std::uint64_t number) {
+  // from the oldest entry on: blocks of a batch lie before the decision on it
+  body_->reader = JournalReader(body_->link->segment.view());
+  body_->decoder.start_at(number);
+}
+
+void Journal::seek_end() {
+  body_->reader.seek_end();
+  body_->decoder.start_at(0);
+}
 
 }  // namespace o80

@@ -1,9 +1,7 @@
 #include "runtime/frontend/loop_state.hpp"
 
+#include <algorithm>
 #include <cstdio>
-#include <cstring>
-#include <fstream>
-#include <vector>
 
 #include "memory/os/process_start.hpp"
 #include "memory/segment/queue_word.hpp"
@@ -15,51 +13,6 @@ namespace o80 {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-
-/// True if the process was stopped by a signal or a debugger; false if that is unknown.
-bool is_process_stopped(int pid, std::uint64_t start) {
-  if (pid <= 0 || process_start(pid) != start) return false;
-  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
-  std::string text;
-  std::getline(file, text);
-  const std::string::size_type name_end = text.rfind(')');
-  if (name_end == std::string::npos || name_end + 2 >= text.size()) return false;
-  const char state = text[name_end + 2];
-  return state == 'T' || state == 't';
-}
-
-/// Reads heads of rows.
-class RowHeads {
- public:
-  explicit RowHeads(const UntypedFrontend& frontend)
-      : history_(frontend.link()->history), row_(frontend.layout().size) {}
-
-  bool read(Iteration k, RowHead& head) {
-    if (!history_.read(k, row_.data())) return false;
-    std::memcpy(&head, row_.data(), sizeof head);
-    return true;
-  }
-
-  /// The oldest row that is at most a second older than `last`, or the one before `last`.
-  bool read_second_before(const RowHead& last, RowHead& head) {
-    Iteration low = history_.oldest();
-    Iteration high = last.iteration - 1;
-    while (low < high) {
-      const Iteration middle = low + (high - low) / 2;
-      RowHead tried;
-      if (!read(middle, tried) || last.time - tried.time > kSecond) {
-        low = middle + 1;
-      } else {
-        high = middle;
-      }
-    }
-    return high >= 0 && read(high, head);
-  }
-
- private:
-  const HistoryReader& history_;
-  std::vector<std::byte> row_;
-};
 
 std::string number(double value) {
   char text[32];
@@ -135,19 +88,25 @@ LoopState loop_state(const UntypedFrontend& frontend, std::int64_t now) {
     if (holder && !holder->bursts && state.last - holder->since >= kLongQueue) {
       state.queue = frontend.link()->queue_text();
     }
-    state.process_stopped = is_process_stopped(state.pid, segment.header().process_start);
+    const ProcessState process = process_state(state.pid);
+    state.process_stopped = process.start == segment.header().process_start &&
+                            (process.letter == 'T' || process.letter == 't');
   }
 
-  RowHeads heads(frontend);
-  RowHead last;
-  if (state.last < 0 || !heads.read(state.last, last)) return state;
+  UntypedObservation row(frontend.description());
+  const HistoryReader& history = frontend.link()->history;
+  if (state.last < 0 || !history.read(state.last, row.bytes())) return state;
+  const RowHead last = row.head();
   state.overruns = last.overruns;
   state.skipped = last.skipped;
   state.starvations = last.starvations;
   if (frontend.schema().head.clock == Clock::simulated) return state;
   state.row_age = now - last.time;
-  RowHead first;
-  if (!heads.read_second_before(last, first) || first.time >= last.time) return state;
+  // the oldest row that is at most a second older, or the one before
+  const Iteration within = frontend.iteration_at(last.time - kSecond - 1) + 1;
+  if (!history.read(std::min(within, last.iteration - 1), row.bytes())) return state;
+  const RowHead first = row.head();
+  if (first.time >= last.time) return state;
   state.recent_rows = static_cast<std::uint32_t>(last.iteration - first.iteration);
   state.recent_overruns = last.overruns - first.overruns;
   state.rate =

@@ -7,7 +7,7 @@
 #include "control/queue/controller.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "runtime/frontend/ends_text.hpp"
-#include "runtime/frontend/link.hpp"
+#include "runtime/frontend/sending.hpp"
 
 namespace o80 {
 
@@ -95,51 +95,30 @@ void settle(const Description& robot, Rows& rows) {
                         " iterations, for which a preview has no rows");
 }
 
-}  // namespace
-
-Preview UntypedFrontend::preview(std::span<const std::uint32_t> actuators,
-                                 std::span<const std::byte> states, const CommandOptions& options,
-                                 std::span<const std::uint64_t> masks) const {
-  Rows rows = history(3);
-  if (rows.count == 0) return preview_from(latest(), actuators, states, options, masks);
-  settle(*link_->description, rows);
-  return preview_after(rows, actuators, states, options, masks);
-}
-
-Preview UntypedFrontend::preview_from(const UntypedObservation& row,
-                                      std::span<const std::uint32_t> actuators,
-                                      std::span<const std::byte> states,
-                                      const CommandOptions& options,
-                                      std::span<const std::uint64_t> masks) const {
-  if (row.size() != layout().size) throw InvalidArgument("the row is from another robot");
-  const Rows rows{row.iteration(), 1, row.size(), {row.bytes(), row.bytes() + row.size()}};
-  return preview_after(rows, actuators, states, options, masks);
-}
-
 /// `rows`: the last ones before the command begins.
-Preview UntypedFrontend::preview_after(const Rows& rows, std::span<const std::uint32_t> actuators,
-                                       std::span<const std::byte> states,
-                                       const CommandOptions& options,
-                                       std::span<const std::uint64_t> masks) const {
+Preview preview_after(Link& link, const Rows& rows, std::span<const std::uint32_t> actuators,
+                      std::span<const std::byte> states, const CommandOptions& options,
+                      std::span<const std::uint64_t> masks) {
+  const auto& [schema, layout, epoch] = *link.description;
   // the record that the command would send
   BatchBuilder builder;
   {
-    const auto lock = link_->lock_to_send();
-    add_commands_to(builder, actuators, states, options, masks);
+    const auto lock = link.lock_to_send();
+    add_commands_to(link, builder, actuators, states, options, masks);
   }
   const auto blocks = builder.seal({.id = Surroundings::kBatch});
   BlockPool pool(static_cast<std::uint32_t>(blocks.size()));
   BlockChain batch;
   for (const Block& block : blocks) pool.append(batch, block.bytes.data());
 
-  const auto desired = [&](std::size_t i) { return rows.row(i).data() + layout().desired; };
-  const std::byte* const observed = rows.row(rows.count - 1).data() + layout().observed;
+  const auto desired = [&](std::size_t i) { return rows.row(i).data() + layout.desired; };
+  const std::byte* const observed = rows.row(rows.count - 1).data() + layout.observed;
   Preview preview;
   preview.rows.first = rows.first + static_cast<Iteration>(rows.count);
-  preview.rows.row_bytes = layout().block;
+  preview.rows.row_bytes = layout.block;
   Surroundings around(preview.rows.first);
-  Controller controller(schema(), pool, around, 1);
-  refuse_unknown(schema(), actuators, masks, controller, desired(rows.count - 1));
+  Controller controller(schema, pool, around, 1);
+  refuse_unknown(schema, actuators, masks, controller, desired(rows.count - 1));
   controller.restart(observed, desired(0), rows.first);
   for (std::size_t i = 1; i < rows.count; ++i) controller.trace(desired(i));
   controller.take(0, batch.first, around);
@@ -149,8 +128,8 @@ Preview UntypedFrontend::preview_after(const Rows& rows, std::span<const std::ui
   for (Iteration now = preview.rows.first; !is_end(end.status); ++now) {
     if (preview.rows.count++ == kMaxPreviewed) throw_too_long();
     // a robot that is where it was asked to be
-    controller.step(now, bytes.empty() ? observed : bytes.data() + bytes.size() - layout().block);
-    bytes.insert(bytes.end(), controller.desired(), controller.desired() + layout().block);
+    controller.step(now, bytes.empty() ? observed : bytes.data() + bytes.size() - layout.block);
+    bytes.insert(bytes.end(), controller.desired(), controller.desired() + layout.block);
   }
   if (end.reason == Reason::late) {
     throw InvalidArgument("the command comes too late: it would begin in iteration " +
@@ -160,6 +139,27 @@ Preview UntypedFrontend::preview_after(const Rows& rows, std::span<const std::ui
   preview.late = end.late;
   if (end.reason == Reason::limits) preview.text = late_text(end.detail, end.late);
   return preview;
+}
+
+}  // namespace
+
+Preview UntypedFrontend::preview(std::span<const std::uint32_t> actuators,
+                                 std::span<const std::byte> states, const CommandOptions& options,
+                                 std::span<const std::uint64_t> masks) const {
+  Rows rows = history(3);
+  if (rows.count == 0) return preview_from(latest(), actuators, states, options, masks);
+  settle(*link_->description, rows);
+  return preview_after(*link_, rows, actuators, states, options, masks);
+}
+
+Preview UntypedFrontend::preview_from(const UntypedObservation& row,
+                                      std::span<const std::uint32_t> actuators,
+                                      std::span<const std::byte> states,
+                                      const CommandOptions& options,
+                                      std::span<const std::uint64_t> masks) const {
+  if (row.size() != layout().size) throw InvalidArgument("the row is from another robot");
+  const Rows rows{row.iteration(), 1, row.size(), {row.bytes(), row.bytes() + row.size()}};
+  return preview_after(*link_, rows, actuators, states, options, masks);
 }
 
 }  // namespace o80

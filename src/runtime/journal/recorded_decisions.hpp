@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "o80/base/time.hpp"
+#include "o80/describe/schema.hpp"
 #include "o80/memory/halt.hpp"
 #include "o80/runtime/journal.hpp"
 
@@ -40,8 +41,10 @@ class RecordedDecisions {
   bool has_driver() const noexcept { return driver_ == Driver::runs; }
 
   // the recording
-  /// Adds the next entry of the journal. Entries that follow from others are left out.
-  void add(const JournalEntry& entry);
+  /// Adds the next entry of the journal. Entries that follow from others are left out. Throws
+  /// InvalidArgument for an entry that no backend of this robot, with so many lanes, writes: the
+  /// recording may be damaged, or from a stranger.
+  void add(const JournalEntry& entry, const Schema& schema, std::uint32_t lanes);
   /// The times of the rows from iteration `first` on [ns].
   void set_times(Iteration first, std::span<const std::int64_t> times);
 

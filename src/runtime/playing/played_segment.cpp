@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "describe/table.hpp"
 #include "memory/segment/named_segment.hpp"
 #include "memory/segment/segment_file.hpp"
 #include "o80/base/error.hpp"
 #include "o80/describe/describe.hpp"
+#include "runtime/journal/journal_codec.hpp"
 #include "runtime/journal/provenance_bytes.hpp"
 
 namespace o80 {
@@ -79,7 +81,43 @@ PlayedSegment::~PlayedSegment() {
 }
 
 Iteration PlayedSegment::add_journal(std::span<const std::byte> entries, std::int64_t codec) {
-  return journal_.add(entries, codec);
+  Iteration last = -1;
+  decode_journal(codec, entries, [&](JournalItem& item) {
+    last = item.head.iteration;
+    added_.push_back(std::move(item));
+  });
+  return last;
+}
+
+void PlayedSegment::write_journal(Iteration k) {
+  for (; !added_.empty() && added_.front().head.iteration <= k; added_.pop_front()) {
+    const JournalItem& item = added_.front();
+    journal_.skip_to(item.head.number);
+    journal_.write(item.head, item.payload.data(), item.payload.size());
+    note(item);
+  }
+}
+
+/// Notes what the segment shows beside its rows.
+void PlayedSegment::note(const JournalItem& item) {
+  const JournalHead& head = item.head;
+  const std::span<const std::byte> payload = item.payload;
+  const bool is_halt = head.kind == JournalKind::halt || head.kind == JournalKind::halt_reason;
+  if (is_halt && payload.size() >= sizeof(JournalHalt)) {
+    const auto halt = unpack<JournalHalt>(payload.data());
+    recorded_halt_ = {
+        .number = head.id,
+        .cause = static_cast<HaltCause>(std::min<std::uint64_t>(halt.cause, kHaltCauses - 1)),
+        .iteration = head.iteration,
+        .who = halt.who,
+        .text = halt.text};
+    recorded_halt_.who.back() = recorded_halt_.text.back() = 0;
+  } else if (head.kind == JournalKind::ended) {
+    const auto* text = reinterpret_cast<const char*>(payload.data());
+    const bool failed = head.what == static_cast<std::uint32_t>(BackendState::failed);
+    recorded_end_ = {failed ? BackendState::failed : BackendState::stopped,
+                     std::string(text, strnlen(text, payload.size()))};
+  }
 }
 
 std::size_t PlayedSegment::count(std::span<const std::byte> rows) const {
@@ -152,7 +190,7 @@ bool PlayedSegment::publish_one(const std::byte* row) {
                           std::to_string(head.iteration) + " follows row " + std::to_string(last_));
   // a copy, because the words of a row are read with their alignment
   std::memcpy(row_.data(), row, layout_.size);
-  journal_.write_until(head.iteration);
+  write_journal(head.iteration);
   show_halt(head.iteration, head.halted != 0);
   if (head.iteration != last_ + 1) history_.skip_to(head.iteration);
   const bool is_first = last_ < 0;
@@ -165,7 +203,7 @@ bool PlayedSegment::publish_one(const std::byte* row) {
 /// Shows a halt from its first row to its last, with the number and the reason that the journal
 /// has.
 void PlayedSegment::show_halt(Iteration k, bool halted) {
-  const Halt& recorded = journal_.halt();
+  const Halt& recorded = recorded_halt_;
   const bool is_new = halted && recorded.number > halts_.halt().number;
   if (halts_.acts() && (!halted || is_new)) {
     while (!halts_.clear()) halts_.poll();
@@ -184,10 +222,9 @@ void PlayedSegment::show_halt(Iteration k, bool halted) {
 void PlayedSegment::end() {
   if (segment_.state() != BackendState::starting && segment_.state() != BackendState::running)
     return;
-  journal_.write_until(last_ + 1);
-  const auto& recorded = journal_.end();
-  if (recorded) return segment_.end(recorded->state, recorded->text);
-  segment_.end(BackendState::stopped);
+  write_journal(last_ + 1);
+  const auto& [state, text] = recorded_end_;
+  segment_.end(state, text);
 }
 
 void PlayedSegment::ask_to_stop() noexcept {

@@ -5,12 +5,15 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "memory/ring/history.hpp"
+#include "memory/ring/journal.hpp"
 #include "memory/segment/halt_word.hpp"
 #include "memory/segment/owned_segment.hpp"
 #include "memory/segment/signal.hpp"
@@ -19,7 +22,6 @@
 #include "o80/describe/schema.hpp"
 #include "o80/runtime/provenance.hpp"
 #include "runtime/backend/burst_server.hpp"
-#include "runtime/playing/journal_player.hpp"
 
 namespace o80 {
 
@@ -78,6 +80,9 @@ class PlayedSegment {
   bool wait_until(std::int64_t due, const KeepWaiting& keep_waiting);
   /// True if a reader must be woken.
   bool publish_one(const std::byte* row);
+  /// Writes the added entries up to this iteration into the journal, with their numbers.
+  void write_journal(Iteration k);
+  void note(const JournalItem& item);
   void show_halt(Iteration k, bool halted);
 
   RowLayout layout_;
@@ -85,7 +90,11 @@ class PlayedSegment {
   HistoryWriter history_;
   RowSignal signal_;
   HaltLatch halts_;
-  JournalPlayer journal_;
+  JournalWriter journal_;
+  std::deque<JournalItem> added_;  // and not written
+  Halt recorded_halt_;  // the newest one that was written; its number is 0 if there is none
+  /// How the recorded backend ended, with the fault of a failed one.
+  std::pair<BackendState, std::string> recorded_end_{BackendState::stopped, {}};
   std::unique_ptr<BurstServer> bursts_;  // null unless bursting
   std::vector<std::uint64_t> row_;       // the row being published
   Iteration last_ = -1;

@@ -5,15 +5,14 @@
 #include <utility>
 #include <vector>
 
+#include "memory/segment/owned_segment.hpp"
 #include "o80/base/error.hpp"
 #include "o80/describe/describe.hpp"
-#include "runtime/journal/recorded_entry_check.hpp"
 
 namespace o80 {
 
-DriverlessReplay::DriverlessReplay(Schema schema, BackendOptions options)
-    : lanes_(options.lanes),
-      backend_(std::move(schema), replaying(std::move(options)), this, &recorded_) {}
+DriverlessReplay::DriverlessReplay(Schema schema, const BackendOptions& options)
+    : backend_(std::move(schema), options, this, &recorded_) {}
 
 void DriverlessReplay::begin_at(Iteration first) noexcept {
   start_ = first;
@@ -27,8 +26,7 @@ void DriverlessReplay::begin_at_rest(Iteration row) noexcept {
 }
 
 void DriverlessReplay::add(const JournalEntry& entry) {
-  check_recorded(entry, backend_.schema(), lanes_);
-  recorded_.add(entry);
+  recorded_.add(entry, backend_.schema(), backend_.segment().view().shape.lanes);
 }
 
 bool DriverlessReplay::run(std::span<const std::byte> rows) {

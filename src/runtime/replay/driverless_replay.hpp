@@ -23,7 +23,7 @@ class DriverlessReplay final : private RequestServer {
  public:
   /// `schema` and `options`: those of the recorded run, with another segment name. Throws as
   /// UntypedBackend.
-  DriverlessReplay(Schema schema, BackendOptions options);
+  DriverlessReplay(Schema schema, const BackendOptions& options);
 
   /// Begins with the fresh start of this row instead of row 0: `run` first publishes the row before
   /// it, and obeys the decisions from the entry of the fresh start on. Call it before `add` and
@@ -56,7 +56,6 @@ class DriverlessReplay final : private RequestServer {
   const std::byte* row_of(Iteration iteration) const noexcept;
   bool publish() noexcept;
 
-  std::uint32_t lanes_;
   RecordedDecisions recorded_{RecordedDecisions::Driver::recorded};
   UntypedBackend backend_;
   std::span<const std::byte> rows_{};  // those that run now

@@ -51,8 +51,8 @@ TEST_P(KilledJournalTest, LeavesEveryEntryThatWasPublishedAndNoOther) {
   for (const long passage : {1L, 2L, 38L, 39L, 40L, 41L, 200L, 300L}) {
     write_until_killed(GetParam(), passage);
     const auto end = static_cast<std::uint64_t>(is_published ? passage : passage - 1);
-    const AttachedSegment attached = AttachedSegment::attach("arm", Access::read_only, patient(),
-                                                             {.dead = AttachOptions::Dead::accept});
+    const AttachedSegment attached =
+        AttachedSegment::attach("arm", Access::read_only, patient(), {.dead = true});
     JournalReader reader(attached.view());
     JournalItem item;
     std::uint64_t next = 0;

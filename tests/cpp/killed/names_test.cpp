@@ -59,9 +59,8 @@ class KilledTest : public SegmentTest, public ::testing::WithParamInterface<cons
   static void expect_whole() {
     for (const Access access : {Access::read_only, Access::read_write}) {
       try {
-        const AttachedSegment segment =
-            AttachedSegment::attach("arm", access, Deadline(std::chrono::nanoseconds(0)),
-                                    {.dead = AttachOptions::Dead::accept});
+        const AttachedSegment segment = AttachedSegment::attach(
+            "arm", access, Deadline(std::chrono::nanoseconds(0)), {.dead = true});
         EXPECT_TRUE(segment.gone());
       } catch (const TimeoutError& none) {
         EXPECT_THAT(none.what(), ::testing::HasSubstr("no segment has that name"));

@@ -24,7 +24,7 @@ struct InlineSimulation {
       : segment(unused_segment_name(std::string(name))),
         robot(std::make_shared<InlineRobot>(std::make_unique<DriverInstance>(table, options),
                                             BackendOptions{.segment = segment, .period = period})),
-        frontend(segment, robot) {}
+        frontend(robot->backend(), robot) {}
 
   UntypedObservation burst(std::int64_t n) { return frontend.burst(n, std::chrono::seconds(60)); }
   template <class State>

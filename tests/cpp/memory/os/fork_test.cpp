@@ -2,6 +2,8 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 
+#include <optional>
+
 #include "memory/blocks.hpp"
 #include "memory/child_process.hpp"
 #include "memory/segment/liveness.hpp"
@@ -59,15 +61,13 @@ TEST_F(ForkTest, LetsAChildOpenEverythingAgain) {
 TEST_F(ForkTest, LeavesFileLockAndLaneToTheParentWhenTheChildEndsInOrder) {
   OwnedSegment owner = running_segment();
   AttachedSegment segment = attach();
-  LaneSender sender(segment);
+  std::optional<LaneSender> sender(std::in_place, segment);
   EXPECT_EQ(in_child([&] {
               // as if the child left the scope of its parent's objects
               {
                 const OwnedSegment gone = std::move(owner);
               }
-              {
-                const LaneSender gone = std::move(sender);
-              }
+              sender.reset();
               {
                 const AttachedSegment gone = std::move(segment);
               }

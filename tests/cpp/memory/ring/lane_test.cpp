@@ -195,9 +195,7 @@ TEST_F(LaneTest, IsResetWhenItsCountersAreImpossible) {
   // the next owner goes on from there
   flush();
   const AttachedSegment other = attach();
-  {
-    const LaneSender moved = std::move(sender);
-  }
+  sender.give_back();
   LaneSender next(other);
   EXPECT_EQ(next.lane(), 0U);
   EXPECT_EQ(next.free_blocks(), 12U);

@@ -77,17 +77,6 @@ TEST_F(AttachedSegmentTest, RaisesTheFaultOfABackendThatCouldNotStart) {
               HasSubstr("the arm does not answer at 10.0.0.2"));
 }
 
-TEST_F(AttachedSegmentTest, CanIgnoreTheFailureOfAnEarlierBackend) {
-  running_segment().end(BackendState::failed, "old");
-  const std::uint64_t old = list_segments().at(0).epoch;
-
-  EXPECT_THROW(AttachedSegment::attach("arm", Access::read_only, soon(), {.ignore_epoch = old}),
-               TimeoutError);
-  const OwnedSegment next = running_segment();
-  EXPECT_NO_THROW(
-      AttachedSegment::attach("arm", Access::read_only, patient(), {.ignore_epoch = old}));
-}
-
 TEST_F(AttachedSegmentTest, EndsItsWaitWhenTheCallerSaysSo) {
   EXPECT_THROW(AttachedSegment::attach("arm", Access::read_only, patient(),
                                        {.keep_waiting = [] { return false; }}),
@@ -105,8 +94,8 @@ TEST_F(AttachedSegmentTest, RefusesEveryCorruptedHeaderWithoutCrashing) {
       bytes[i] = static_cast<char>(value);
       write_all(path, bytes);
       try {
-        const auto segment = AttachedSegment::attach("arm", Access::read_write, soon(),
-                                                     {.dead = AttachOptions::Dead::accept});
+        const auto segment =
+            AttachedSegment::attach("arm", Access::read_write, soon(), {.dead = true});
         EXPECT_LE(segment.view().offsets.file_bytes, whole.size());
         // the last byte of the last part: out of bounds would end the test
         const SegmentView& view = segment.view();
@@ -149,8 +138,7 @@ TEST_F(AttachedSegmentTest, WaitsPastAStoppedSegmentUnlessItIsToBeRead) {
     const LockFile file = LockFile::open(directory_.file_of("arm"), O_RDWR);
     const auto stopped = static_cast<std::uint32_t>(BackendState::stopped);
     const auto where =
-        static_cast<off_t>(AttachedSegment::attach("arm", Access::read_only, soon(),
-                                                   {.dead = AttachOptions::Dead::accept})
+        static_cast<off_t>(AttachedSegment::attach("arm", Access::read_only, soon(), {.dead = true})
                                .view()
                                .offsets.counters +
                            offsetof(Counters, state));
@@ -160,9 +148,7 @@ TEST_F(AttachedSegmentTest, WaitsPastAStoppedSegmentUnlessItIsToBeRead) {
   EXPECT_THAT(
       message_of<TimeoutError>([] { AttachedSegment::attach("arm", Access::read_only, soon()); }),
       AllOf(HasSubstr("was stopped"), HasSubstr("no new one has started")));
-  EXPECT_EQ(AttachedSegment::attach("arm", Access::read_only, soon(),
-                                    {.dead = AttachOptions::Dead::accept})
-                .life(),
+  EXPECT_EQ(AttachedSegment::attach("arm", Access::read_only, soon(), {.dead = true}).life(),
             Life::stopped);
 }
 

@@ -28,7 +28,7 @@ using ForeignFileTest = SegmentTest;
 std::string refusal() {
   std::string said;
   for (const Access access : {Access::read_only, Access::read_write})
-    for (const auto dead : {AttachOptions::Dead::wait, AttachOptions::Dead::accept})
+    for (const bool dead : {false, true})
       said += message_of<SegmentError>(
                   [&] { AttachedSegment::attach("arm", access, patient(), {.dead = dead}); }) +
               "\n";

@@ -194,7 +194,7 @@ TEST_F(SignalTest, WakesABackendThatSleepsAtTheBell) {
     }
   });
   while (segment_.view().wakes().sleeping.load() == 0) std::this_thread::yield();
-  BellWaiter(segment_.view()).interrupt();
+  ring_bell(segment_.view());
   backend.join();
   EXPECT_EQ(segment_.view().wakes().sleeping.load(), 0U);
 }

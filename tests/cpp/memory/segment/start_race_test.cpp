@@ -100,8 +100,7 @@ TEST_F(StartRaceTest, IsWonByExactlyOneProcessAndTheOthersLearnWhoItIs) {
       EXPECT_EQ(last->life(), Life::superseded);
     }
     // the winner was killed with the others: from here on the name is that of a dead one
-    last.emplace(AttachedSegment::attach("arm", Access::read_only, patient(),
-                                         {.dead = AttachOptions::Dead::accept}));
+    last.emplace(AttachedSegment::attach("arm", Access::read_only, patient(), {.dead = true}));
   }
 }
 

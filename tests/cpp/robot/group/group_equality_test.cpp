@@ -119,8 +119,8 @@ class Singles final : public Side {
       options.segment = "single-" + std::to_string(i);
       robots_.push_back(
           std::make_shared<InlineRobot>(std::make_unique<DriverInstance>(table, robot), options));
-      frontends_.push_back(std::make_unique<UntypedFrontend>(options.segment, robots_[i]));
-      others_.push_back(std::make_unique<UntypedFrontend>(options.segment, robots_[i]));
+      frontends_.push_back(std::make_unique<UntypedFrontend>(robots_[i]->backend(), robots_[i]));
+      others_.push_back(std::make_unique<UntypedFrontend>(robots_[i]->backend(), robots_[i]));
     }
   }
   std::size_t copies() const { return robots_.size(); }

@@ -17,6 +17,10 @@ std::unique_ptr<DriverInstance> two_joints() {
   return std::make_unique<DriverInstance>(*library.table, OptionValues{{"gain", "30"}});
 }
 
+UntypedFrontend frontend_of(const std::shared_ptr<InlineRobot>& robot) {
+  return {robot->backend(), robot};
+}
+
 /// Commands, bursts, a reset and a restore.
 std::vector<std::byte> play(UntypedFrontend& frontend) {
   for (int i = 0; i < 10; ++i) {
@@ -40,14 +44,14 @@ TEST_F(InlineRobotTest, GivesTheSameRowsBitForBitAsABurstingProcess) {
   process.signal(SIGTERM);
   EXPECT_EQ(process.end().code, 0);
 
-  UntypedFrontend own("here", here(two_joints()));
+  UntypedFrontend own = frontend_of(here(two_joints()));
   const std::vector<std::byte> again = play(own);
   ASSERT_GT(rows.size(), 0U);
   EXPECT_EQ(again, rows);
 }
 
 TEST_F(InlineRobotTest, LetsOthersWatchAndCommand) {
-  UntypedFrontend owner("here", here(two_joints()));
+  UntypedFrontend owner = frontend_of(here(two_joints()));
   UntypedFrontend other("here");
   const Batch theirs = send(other, 1, 1.0);
   owner.burst(1, kAtOnce);
@@ -60,7 +64,7 @@ TEST_F(InlineRobotTest, LeavesTheRestOfABurstThatItsCallerCuts) {
   int requested = 0;
   const auto robot = std::make_shared<InlineRobot>(two_joints(), BackendOptions{.segment = "here"},
                                                    [&requested] { return ++requested < 2; });
-  UntypedFrontend frontend("here", robot);
+  UntypedFrontend frontend = frontend_of(robot);
   EXPECT_THROW(frontend.burst(1'000'000'000'000, kPatience), Cancelled);
   const Iteration reached = frontend.published();
   EXPECT_GT(reached, 0);
@@ -81,7 +85,7 @@ TEST_F(InlineRobotTest, LeavesTheHardwareToTheParentOfAForkedChild) {
 }
 
 TEST_F(InlineRobotTest, WaitsForNothingOfItsOwn) {
-  UntypedFrontend frontend("here", here(two_joints()));
+  UntypedFrontend frontend = frontend_of(here(two_joints()));
   add(frontend, 0, 1.0, {.pace = iterations(100)});
   EXPECT_EQ(frontend.pulse_and_wait(kAtOnce).iteration(), 100);
   EXPECT_EQ(frontend.burst(5, kAtOnce).iteration(), 105);
@@ -92,7 +96,7 @@ TEST_F(InlineRobotTest, WaitsForNothingOfItsOwn) {
 }
 
 TEST_F(InlineRobotTest, RaisesAFaultWhereItWasBurst) {
-  UntypedFrontend frontend("here", here(driver({{"fails", "write"}})));
+  UntypedFrontend frontend = frontend_of(here(driver({{"fails", "write"}})));
   EXPECT_THAT(message_of<DriverError>([&] { frontend.burst(10, kPatience); }),
               HasSubstr("wire cut"));
   EXPECT_EQ(FakeDriver::calls.stopped, 1);
@@ -147,13 +151,17 @@ O80_DESCRIBE(Summing::Joint, angle, on);
 
 TEST_F(InlineRobotTest, GivesADriverTheRatesOfItsDesiredStates) {
   const RobotTable& summing = *robot_table<Summing>("summing");
-  Frontend<Summing> frontend("here",
-                             here(std::make_unique<DriverInstance>(summing, OptionValues{})));
+  UntypedFrontend owner =
+      frontend_of(here(std::make_unique<DriverInstance>(summing, OptionValues{})));
+  Frontend<Summing> frontend("here");
   frontend.add_command(0, Summing::Joint{0.3, false});
   frontend.add_command(1, Summing::Joint{1.0, true}, {.pace = iterations(40)});
-  frontend.burst(60, kPatience);
+  frontend.pulse();
+  owner.burst(60, kPatience);
   frontend.add_command(0, Summing::Joint{-0.1, false}, {.mode = Mode::overwrite});
-  EXPECT_EQ(frontend.burst(600, kPatience).desired()[0].angle, -0.1);
+  frontend.pulse();
+  owner.burst(600, kPatience);
+  EXPECT_EQ(frontend.latest().desired()[0].angle, -0.1);
 }
 
 }  // namespace

@@ -102,7 +102,7 @@ TEST(RecordedDecisions, AHaltBeforeAnEndInOrderNeedsNoEntry) {
     JournalEntry stopping;
     stopping.kind = JournalKind::stopping;
     stopping.iteration = 7;
-    if (stops) recorded.add(stopping);
+    if (stops) recorded.add(stopping, Schema(), 1);
     recorded.ask_to_halt(HaltCause::driver, "too high");
     if (stops) recorded.take();
     recorded.end_decisions(7);

@@ -4,7 +4,7 @@
 // just died.
 //
 // Transcribed from src/memory/segment/segment_draft.cpp (try_replace, supersede, judge_predecessor),
-// owned_segment.cpp (create, release), halt_word.cpp (request_halt, HaltLatch) and
+// owned_segment.cpp (create, end_if_alive), halt_word.cpp (request_halt, HaltLatch) and
 // src/runtime/frontend/frontend_halt.cpp (halt), src/runtime/backend/backend.cpp (show_acts,
 // resume). Who gets the name is the matter of take_over.pml; here the lock of the dead is enough.
 //

@@ -3,7 +3,7 @@
 // backend that may stop or be killed.
 //
 // Transcribed from src/memory/segment/segment_draft.cpp, named_segment.cpp, owned_segment.cpp
-// (release, remove) and segment_list.cpp (clean). One step is one system call. A dead
+// (end_if_alive, remove) and segment_list.cpp (clean). One step is one system call. A dead
 // process keeps its locks until the kernel has torn it down, at any later time. A segment file and the commanders' file of
 // its epoch have the same number here.
 //
