@@ -13,19 +13,13 @@
 
 namespace {
 
-const char* name_of(o80::LoopOption::Kind kind) {
-  constexpr const char* kNames[] = {"text", "number", "integer", "boolean",
-                                    "word", "octal",  "list"};
-  return kNames[static_cast<std::size_t>(kind)];
-}
-
 /// Name, kind, allowed values, default, help, and where the option can be given.
 nb::list described_loop_options() {
   using Option = o80::LoopOption;
   nb::list all;
   for (const Option& each : o80::loop_options()) {
-    all.append(nb::make_tuple(each.name, name_of(each.kind), each.allowed, each.otherwise,
-                              each.help, (each.scope & (Option::kProcess | Option::kFlag)) != 0,
+    all.append(nb::make_tuple(each.name, each.kind_name(), each.allowed, each.otherwise, each.help,
+                              (each.scope & (Option::kProcess | Option::kFlag)) != 0,
                               (each.scope & Option::kProcess) != 0,
                               (each.scope & Option::kInline) != 0,
                               (each.scope & Option::kEmbedded) != 0));

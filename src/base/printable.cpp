@@ -33,29 +33,28 @@ bool controls(char32_t code) noexcept {
 
 struct Character {
   std::size_t bytes;
-  char instead;  // 0: it stays
-  bool is_cut;   // the text ends inside it
+  bool is_valid;
+  bool is_cut;  // the text ends inside it
+  char32_t code;
 };
-
-/// What a valid character becomes; 0: it stays.
-char instead_of(char32_t code) noexcept { return controls(code) ? '?' : '\0'; }
 
 /// The first character of a text that is not empty; of invalid bytes those that belong together.
 Character first_character(std::string_view text) noexcept {
   constexpr char32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};  // shorter forms are invalid
   const auto lead = static_cast<unsigned char>(text[0]);
-  if (lead < 0x80) return {1, instead_of(lead), false};
-  if (lead < 0xC2 || lead > 0xF4) return {1, '?', false};
+  if (lead < 0x80) return {1, true, false, lead};
+  if (lead < 0xC2 || lead > 0xF4) return {1, false, false, 0};
   const std::size_t bytes = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : 2;
   char32_t code = lead & (0x7FU >> bytes);
   for (std::size_t i = 1; i < bytes; ++i) {
-    if (i == text.size()) return {i, '?', true};
+    if (i == text.size()) return {i, false, true, 0};
     const auto next = static_cast<unsigned char>(text[i]);
-    if ((next & 0xC0U) != 0x80) return {i, '?', false};
+    if ((next & 0xC0U) != 0x80) return {i, false, false, 0};
     code = code << 6 | (next & 0x3FU);
   }
-  const bool is_valid = code >= kLeast[bytes] && (code < 0xD800 || code > 0xDFFF);
-  return {bytes, is_valid ? instead_of(code) : '?', false};
+  const bool is_valid =
+      code >= kLeast[bytes] && code <= 0x10FFFF && (code < 0xD800 || code > 0xDFFF);
+  return {bytes, is_valid, false, code};
 }
 
 }  // namespace
@@ -64,13 +63,24 @@ std::size_t printable(std::string_view text, char* to, std::size_t room) noexcep
   std::size_t size = 0;
   while (!text.empty()) {
     const Character next = first_character(text);
-    const std::size_t added = next.instead == 0 ? next.bytes : 1;
+    const bool stays = next.is_valid && !controls(next.code);
+    const std::size_t added = stays ? next.bytes : 1;
     if (next.is_cut || added > room - size) break;
-    std::memcpy(to + size, next.instead == 0 ? text.data() : &next.instead, added);
+    std::memcpy(to + size, stays ? text.data() : "?", added);
     size += added;
     text.remove_prefix(next.bytes);
   }
   return size;
+}
+
+bool is_utf8(std::string_view text) noexcept {
+  bool is_valid = true;
+  while (is_valid && !text.empty()) {
+    const Character next = first_character(text);
+    is_valid = next.is_valid;
+    text.remove_prefix(next.bytes);
+  }
+  return is_valid;
 }
 
 std::string printable(std::string_view text) {

@@ -19,4 +19,7 @@ std::string printable(std::string_view text);
 /// Realtime: yes.
 std::size_t printable(std::string_view text, char* to, std::size_t room) noexcept;
 
+/// True for valid UTF-8: no stray byte, no overlong form, no surrogate, nothing above 0x10FFFF.
+bool is_utf8(std::string_view text) noexcept;
+
 }  // namespace o80

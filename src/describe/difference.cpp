@@ -1,10 +1,8 @@
-#include <algorithm>
 #include <map>
 #include <sstream>
-#include <utility>
-#include <vector>
 
 #include "describe/table.hpp"
+#include "describe/visit_number.hpp"
 
 namespace o80 {
 
@@ -41,10 +39,7 @@ Lines fields_of(const Schema& schema, std::uint32_t type) {
 }
 
 std::string kind_name(const Schema& schema, const FieldRow& field) {
-  static constexpr const char* kNames[] = {"boolean", "int8",   "int16",  "int32",  "int64",
-                                           "uint8",   "uint16", "uint32", "uint64", "float32",
-                                           "float64", "enum",   "struct", "text"};
-  std::string name = kNames[static_cast<int>(field.kind)];
+  std::string name = kKindNames[static_cast<int>(field.kind)];
   if (field.kind == Kind::structure) {
     name = "{";
     for (const auto& [inner, line] : fields_of(schema, field.type))
@@ -143,30 +138,25 @@ int rank(std::string_view what) {
 }
 
 std::string compare(const Lines& expected, const Lines& found) {
-  std::vector<std::pair<int, std::string>> lines;
-  const auto add = [&](const std::string& what, const std::string& wanted,
-                       const std::string& there) {
-    std::pair<int, std::string> line{
-        rank(what), "  " + what + ": expected " + wanted + ", found " + there + "\n"};
-    const auto place =
-        std::ranges::upper_bound(lines, line.first, {}, &std::pair<int, std::string>::first);
-    lines.insert(place, std::move(line));
+  const auto value_in = [](const Lines& lines, const std::string& what) {
+    const auto line = lines.find(what);
+    return line == lines.end() ? std::string("nothing") : line->second;
   };
-  for (const auto& [what, line] : expected) {
-    const auto other = found.find(what);
-    if (other == found.end()) {
-      add(what, line, "nothing");
-    } else if (other->second != line) {
-      add(what, line, other->second);
-    }
-  }
-  for (const auto& [what, line] : found) {
-    if (!expected.contains(what)) add(what, "nothing", line);
+  Lines all = expected;
+  all.insert(found.begin(), found.end());
+  std::multimap<int, std::string> different;  // by rank
+  for (const auto& [what, value] : all) {
+    const std::string wanted = value_in(expected, what);
+    const std::string there = value_in(found, what);
+    if (wanted == there) continue;
+    different.emplace(rank(what), "  " + what + ": expected " + wanted + ", found " + there + "\n");
   }
   std::string text;
-  const std::size_t shown = std::min(lines.size(), kShown);
-  for (std::size_t i = 0; i < shown; ++i) text += lines[i].second;
-  const std::size_t more = lines.size() - shown;
+  std::size_t shown = 0;
+  for (auto each = different.begin(); each != different.end() && shown < kShown; ++each, ++shown) {
+    text += each->second;
+  }
+  const std::size_t more = different.size() - shown;
   return more == 0 ? text : text + "  and " + std::to_string(more) + " more differences\n";
 }
 

@@ -6,6 +6,7 @@
 #include <set>
 #include <type_traits>
 
+#include "base/printable.hpp"
 #include "describe/visit_number.hpp"
 
 namespace o80 {
@@ -21,31 +22,6 @@ constexpr std::uint32_t kMaxNested = 16;
 
 [[noreturn]] void refuse(const std::string& why) {
   throw InvalidArgument("invalid description: " + why);
-}
-
-/// True for valid UTF-8: no stray byte, no overlong form, no surrogate, nothing above 0x10FFFF.
-bool is_utf8(std::string_view text) {
-  for (std::size_t i = 0; i < text.size();) {
-    const auto first = static_cast<unsigned char>(text[i]);
-    const std::size_t more = first < 0x80   ? 0
-                             : first < 0xC2 ? 4
-                             : first < 0xE0 ? 1
-                             : first < 0xF0 ? 2
-                             : first < 0xF5 ? 3
-                                            : 4;
-    if (more == 4 || i + more >= text.size()) return false;
-    std::uint32_t code = more == 0 ? first : first & (0x3FU >> more);
-    for (std::size_t k = 1; k <= more; ++k) {
-      const auto next = static_cast<unsigned char>(text[i + k]);
-      if ((next & 0xC0) != 0x80) return false;
-      code = code << 6 | (next & 0x3F);
-    }
-    constexpr std::uint32_t kShortest[] = {0, 0x80, 0x800, 0x10000};
-    if (code < kShortest[more] || code > 0x10FFFF || (code >= 0xD800 && code < 0xE000))
-      return false;
-    i += more + 1;
-  }
-  return true;
 }
 
 template <class Row>
@@ -196,6 +172,7 @@ void check_limit(const ActuatorRow& actuator, const FieldRow& field, const Limit
 void check_actuators(const Schema& schema, const std::vector<std::uint64_t>& numbers) {
   if (schema.actuators.size() >= kMaxActuators) refuse("too many actuators");
   std::set<std::string_view> names;
+  std::size_t limits = 0;
   for (const ActuatorRow& actuator : schema.actuators) {
     const std::string name = "actuator '" + actuator.name.str() + "' ";
     check_text(actuator.name, "an actuator's name");
@@ -214,15 +191,17 @@ void check_actuators(const Schema& schema, const std::vector<std::uint64_t>& num
     if (static_cast<int>(actuator.when_idle) > static_cast<int>(WhenIdle::follow)) {
       refuse(name + "has an unknown when_idle");
     }
-    if (std::uint64_t{actuator.first_limit} + actuator.limits > schema.limits.size() ||
-        actuator.limits != numbers[actuator.type]) {
+    if (actuator.first_limit != limits || actuator.limits != numbers[actuator.type] ||
+        actuator.limits > schema.limits.size() - limits) {
       refuse(name + "must have one limit for each number of its state");
     }
+    limits += actuator.limits;
     const LimitRow* limit = schema.limits.data() + actuator.first_limit;
     schema.each_scalar(actuator.type, [&](std::uint32_t, const FieldRow& field) {
       check_limit(actuator, field, *limit++);
     });
   }
+  if (limits != schema.limits.size()) refuse("a limit belongs to no actuator");
 }
 
 void check_integral(const Schema& schema, const ActuatorRow& actuator, const IntegralRow& row) {
@@ -335,13 +314,6 @@ void check(const Schema& schema) {
   }
   for (const LabelRow& label : schema.labels) check_text(label.name, "a label");
   check_actuators(schema, numbers);
-  // also limits that belong to no actuator: with a NaN a schema would not equal itself
-  for (const LimitRow& limit : schema.limits) {
-    for (const double value : {limit.minimum, limit.maximum, limit.speed, limit.acceleration,
-                               limit.jerk, limit.error, limit.rest, double{limit.noise}}) {
-      if (std::isnan(value)) refuse("a limit is NaN");
-    }
-  }
   check_integrals(schema);
   check_groups(schema);
   check_shown(schema);

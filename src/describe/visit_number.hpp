@@ -6,6 +6,11 @@
 
 namespace o80 {
 
+/// Names of kinds in descriptions, in their order.
+inline constexpr const char* kKindNames[] = {"bool",    "int8",   "int16",  "int32",  "int64",
+                                             "uint8",   "uint16", "uint32", "uint64", "float32",
+                                             "float64", "enum",   "struct", "text"};
+
 /// Calls `visit(T{})` with the C++ type of a number of this kind. Kinds without such a type
 /// (boolean, enumeration, structure) are passed as a byte.
 template <class Visit>

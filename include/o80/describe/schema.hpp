@@ -170,27 +170,10 @@ class Schema {
                    std::uint32_t count, bool is_array);
 };
 
-/// Size in shared memory of a number of this kind [bytes].
+/// Size in shared memory of a number of this kind [bytes]; 0 for the kinds behind float64.
 constexpr std::uint32_t size_of(Kind kind) {
-  switch (kind) {
-    case Kind::boolean:
-    case Kind::int8:
-    case Kind::uint8:
-      return 1;
-    case Kind::int16:
-    case Kind::uint16:
-      return 2;
-    case Kind::int32:
-    case Kind::uint32:
-    case Kind::float32:
-      return 4;
-    case Kind::int64:
-    case Kind::uint64:
-    case Kind::float64:
-      return 8;
-    default:
-      return 0;
-  }
+  constexpr std::uint32_t kSizes[] = {1, 1, 2, 4, 8, 1, 2, 4, 8, 4, 8};  // in the order of Kind
+  return kind <= Kind::float64 ? kSizes[static_cast<std::size_t>(kind)] : 0;
 }
 
 /// A plain field for `Schema::add_type`: `scalar_field("position", Kind::float64, "[rad]")`.

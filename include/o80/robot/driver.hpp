@@ -117,19 +117,13 @@ class Reading {
 
   /// Ends the loop as failed; frontends raise BackendFailed with this text.
   void fault(std::string_view text) {
-    const std::size_t size =
-        text.size() < sizeof fault_.text ? text.size() : sizeof fault_.text - 1;
-    if (size > 0) std::memcpy(fault_.text, text.data(), size);
-    fault_.text[size] = 0;
+    store_text(fault_.text, text);
     faulty_ = true;
   }
   /// Halts the backend in the next iteration: the actuators brake, and nothing moves until a
   /// frontend resumes. A driver may halt in each reading: a repeated text is the same halt.
   void halt(std::string_view why) {
-    const std::size_t size =
-        why.size() < sizeof view_.halt_text.text ? why.size() : sizeof view_.halt_text.text - 1;
-    if (size > 0) std::memcpy(view_.halt_text.text, why.data(), size);
-    view_.halt_text.text[size] = 0;
+    store_text(view_.halt_text.text, why);
     view_.halted = 1;
   }
   /// Reports a tick without a reading, for example after a lost packet: the last reading
@@ -203,10 +197,7 @@ class Reading {
   void store_report(RequestReport& report, RequestAnswer answer, std::string_view text) {
     if (report.runs == 0 || (report.changed != 0 && report.answer != RequestAnswer::running))
       return;
-    const std::size_t size =
-        text.size() < sizeof report.text ? text.size() : sizeof report.text - 1;
-    if (size > 0) std::memcpy(report.text, text.data(), size);
-    report.text[size] = 0;
+    store_text(report.text, text);
     report.answer = answer;
     report.changed = 1;
     view_.reported = 1;

@@ -40,21 +40,6 @@ O80_MEMBER(resume)
 O80_MEMBER(on)
 O80_MEMBER(Requests)
 O80_MEMBER(Extended)
-O80_MEMBER(Describe)
-O80_MEMBER(describes)
-O80_MEMBER(descibe)
-O80_MEMBER(desribe)
-O80_MEMBER(discribe)
-O80_MEMBER(Wait)
-O80_MEMBER(waits)
-O80_MEMBER(Halt)
-O80_MEMBER(on_halt)
-O80_MEMBER(onHalt)
-O80_MEMBER(Resume)
-O80_MEMBER(resme)
-O80_MEMBER(reusme)
-O80_MEMBER(on_resume)
-O80_MEMBER(onResume)
 #undef O80_MEMBER
 // NOLINTEND(readability-identifier-naming)
 
@@ -156,6 +141,7 @@ struct NeededVerbs {
   static constexpr bool kPassed = true;
 };
 
+#define O80_VERB(name) requires { &D::name; }
 /// The optional functions: if present, they must have the expected signature.
 template <class D>
 struct Verbs {
@@ -180,16 +166,17 @@ struct Verbs {
         { driver.resume() } -> NothingOrServed;
       }, "a driver's resume must be `void resume()` or `o80::Served resume()`, and public");
 
-  static_assert(has_describe<D>() || !(has_Describe<D>() || has_describes<D>() ||
-                                       has_descibe<D>() || has_desribe<D>() || has_discribe<D>()),
+  static_assert(has_describe<D>() ||
+                    !(O80_VERB(Describe) || O80_VERB(describes) || O80_VERB(descibe) ||
+                      O80_VERB(desribe) || O80_VERB(discribe)),
                 "this driver has `Describe`, `describes`, `descibe`, `desribe` or `discribe`: "
                 "rename it to `describe`");
-  static_assert(has_wait<D>() || !(has_Wait<D>() || has_waits<D>()),
+  static_assert(has_wait<D>() || !(O80_VERB(Wait) || O80_VERB(waits)),
                 "this driver has `Wait` or `waits`: rename it to `wait`");
-  static_assert(has_halt<D>() || !(has_Halt<D>() || has_on_halt<D>() || has_onHalt<D>()),
+  static_assert(has_halt<D>() || !(O80_VERB(Halt) || O80_VERB(on_halt) || O80_VERB(onHalt)),
                 "this driver has `Halt`, `on_halt` or `onHalt`: rename it to `halt`");
-  static_assert(has_resume<D>() || !(has_Resume<D>() || has_on_resume<D>() || has_onResume<D>() ||
-                                     has_resme<D>() || has_reusme<D>()),
+  static_assert(has_resume<D>() || !(O80_VERB(Resume) || O80_VERB(on_resume) ||
+                                     O80_VERB(onResume) || O80_VERB(resme) || O80_VERB(reusme)),
                 "this driver has `Resume`, `on_resume`, `onResume`, `resme` or `reusme`: rename it "
                 "to `resume`");
   static constexpr bool kPassed = true;
@@ -220,6 +207,7 @@ struct Types {
   static constexpr bool kPassed = true;
 };
 #undef O80_TYPE
+#undef O80_VERB
 
 template <class D>
 struct Handlers {

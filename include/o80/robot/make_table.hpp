@@ -26,23 +26,26 @@ namespace o80 {
 
 namespace driving {
 
-inline void set_fault(FaultText* fault, const char* text) {
-  const std::size_t size = strnlen(text, sizeof fault->text - 1);
-  std::memcpy(fault->text, text, size);
-  fault->text[size] = 0;
-}
-
 /// Calls the driver. An exception is stored as the fault, and the result is `failed`.
 template <class Result, class Call>
 Result guarded(FaultText* fault, Result failed, Call&& call) noexcept {
   try {
     return call();
   } catch (const std::exception& error) {
-    set_fault(fault, error.what());
+    store_text(fault->text, error.what());
   } catch (...) {
-    set_fault(fault, "the driver threw something that is not a std::exception");
+    store_text(fault->text, "the driver threw something that is not a std::exception");
   }
   return failed;
+}
+
+/// The same for functions that return 0, or 1 with a fault.
+template <class Call>
+int done(FaultText* fault, Call&& call) noexcept {
+  return guarded(fault, 1, [&] {
+    call();
+    return 0;
+  });
 }
 
 template <Driver D>
@@ -61,21 +64,21 @@ typename D::Config config_of(const OptionValue* values, std::uint32_t count) {
   return config;
 }
 
-inline RequestAnswer answer_of(const Served& served, FaultText* text) {
-  set_fault(text, served.text.data());
-  return static_cast<RequestAnswer>(served.kind);
-}
-
-template <Driver D, class Request>
-RequestAnswer serve(D& driver, const std::byte* payload, FaultText* text) {
-  if constexpr (requires {
-                  { driver.on(unpack<Request>(payload)) } -> std::same_as<Served>;
-                }) {
-    return answer_of(driver.on(unpack<Request>(payload)), text);
-  } else {
-    driver.on(unpack<Request>(payload));
+/// Calls a function of the driver that returns void or Served.
+template <class Call>
+RequestAnswer answer(FaultText* text, Call&& call) {
+  if constexpr (std::is_void_v<decltype(call())>) {
+    call();
     return RequestAnswer::done;
+  } else {
+    const Served served = call();
+    store_text(text->text, served.why());
+    return static_cast<RequestAnswer>(served.kind);
   }
+}
+template <class Request, class D>
+RequestAnswer serve(D& driver, const std::byte* payload, FaultText* text) {
+  return answer(text, [&] { return driver.on(unpack<Request>(payload)); });
 }
 static_assert(static_cast<int>(RequestAnswer::rejected) ==
                   static_cast<int>(Served::Kind::rejected) &&
@@ -109,10 +112,7 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
     };
     t.accepts = [](void* /*self*/, const OptionValue* values, std::uint32_t count,
                    FaultText* fault) {
-      return driving::guarded<int>(fault, 1, [&] {
-        static_cast<void>(driving::config_of<D>(values, count));
-        return 0;
-      });
+      return driving::done(fault, [&] { static_cast<void>(driving::config_of<D>(values, count)); });
     };
     t.create = [](void* /*self*/, const OptionValue* values, std::uint32_t count,
                   FaultText* fault) -> void* {
@@ -121,41 +121,31 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
     };
     t.describe = [](void* robot, std::int64_t period, void* context, SchemaTaker* take,
                     FaultText* fault) {
-      return driving::guarded<int>(fault, 1, [&] {
+      return driving::done(fault, [&] {
         Schema schema;
         driving::describe_driver(*static_cast<const D*>(robot), robot_name, period, schema);
         const std::vector<std::byte> bytes = to_bytes(schema);
         take(context, bytes.data(), bytes.size(), schema.hooks.data());
-        return 0;
       });
     };
     t.start = [](void* robot, FaultText* fault) {
-      return driving::guarded<int>(fault, 1, [&] {
-        static_cast<D*>(robot)->start();
-        return 0;
-      });
+      return driving::done(fault, [&] { static_cast<D*>(robot)->start(); });
     };
     if constexpr (requires(D& driver, std::int64_t due) { driver.wait(due); }) {
       t.paces_itself = 1;
       t.wait = [](void* robot, std::int64_t due, FaultText* fault) {
-        return driving::guarded<int>(fault, 1, [&] {
-          static_cast<D*>(robot)->wait(due);
-          return 0;
-        });
+        return driving::done(fault, [&] { static_cast<D*>(robot)->wait(due); });
       };
     }
     t.write = [](void* robot, const DesiredView* view, FaultText* fault) {
-      return driving::guarded<int>(fault, 1, [&] {
-        static_cast<D*>(robot)->write(Desired<D>(*view));
-        return 0;
-      });
+      return driving::done(fault, [&] { static_cast<D*>(robot)->write(Desired<D>(*view)); });
     };
     t.read = [](void* robot, ReadingView* view, FaultText* fault) {
-      return driving::guarded<int>(fault, 1, [&] {
+      return driving::guarded(fault, 1, [&] {
         Reading<D> reading(*view);
         static_cast<D*>(robot)->read(reading);
         reading.store();
-        if (reading.faulty()) driving::set_fault(fault, reading.fault_text().text);
+        if (reading.faulty()) *fault = reading.fault_text();
         return reading.faulty() ? 1 : 0;
       });
     };
@@ -165,38 +155,26 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
         RequestAnswer answer = RequestAnswer::rejected;
         std::uint32_t i = 0;
         const bool known = [&]<class... Each>(Requests<Each...>) {
-          return (
-              (i++ == index && (answer = driving::serve<D, Each>(driver, payload, text), true)) ||
-              ...);
+          return ((i++ == index && (answer = driving::serve<Each>(driver, payload, text), true)) ||
+                  ...);
         }(RequestsOf<D>{});
         if constexpr (requires {
                         { driver.on(index, payload) } -> std::same_as<Served>;
                       }) {
-          if (!known) answer = driving::answer_of(driver.on(index, payload), text);
+          if (!known) answer = driving::answer(text, [&] { return driver.on(index, payload); });
         }
         return answer;
       });
     };
     if constexpr (requires(D& driver) { driver.halt(); }) {
       t.halt = [](void* robot, FaultText* fault) {
-        return driving::guarded<int>(fault, 1, [&] {
-          static_cast<D*>(robot)->halt();
-          return 0;
-        });
+        return driving::done(fault, [&] { static_cast<D*>(robot)->halt(); });
       };
     }
     if constexpr (requires(D& driver) { driver.resume(); }) {
       t.resume = [](void* robot, FaultText* text) {
         return driving::guarded<RequestAnswer>(text, RequestAnswer::failed, [&] {
-          D& driver = *static_cast<D*>(robot);
-          if constexpr (requires {
-                          { driver.resume() } -> std::same_as<Served>;
-                        }) {
-            return driving::answer_of(driver.resume(), text);
-          } else {
-            driver.resume();
-            return RequestAnswer::done;
-          }
+          return driving::answer(text, [&] { return static_cast<D*>(robot)->resume(); });
         });
       };
     }
@@ -208,21 +186,16 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
                             std::uint64_t* size) -> const std::byte* {
         std::span<const std::byte> bytes;
         FaultText fault;
-        static_cast<void>(driving::guarded<int>(&fault, 1, [&] {
-          bytes = static_cast<D*>(robot)->snapshot_bytes(slot);
-          return 0;
-        }));
+        driving::done(&fault, [&] { bytes = static_cast<D*>(robot)->snapshot_bytes(slot); });
         *size = bytes.size();
         return bytes.data();
       };
       t.load_snapshot = [](void* robot, std::uint32_t slot, const std::byte* bytes,
                            std::uint64_t size, FaultText* fault) {
-        return driving::guarded<int>(fault, 1, [&] {
-          if (static_cast<D*>(robot)->load_snapshot(slot, {bytes, size})) return 0;
-          driving::set_fault(fault,
-                             "the recorded snapshot is of another robot, or of another "
-                             "version of its driver");
-          return 1;
+        return driving::done(fault, [&] {
+          if (static_cast<D*>(robot)->load_snapshot(slot, {bytes, size})) return;
+          throw DriverError(
+              "the recorded snapshot is of another robot, or of another version of its driver");
         });
       };
     }

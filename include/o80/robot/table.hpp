@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <string_view>
 
 #include "o80/describe/hooks.hpp"
 #include "o80/describe/rows.hpp"
@@ -19,6 +21,14 @@ inline constexpr std::uint32_t kRobotTableVersion = 9;
 struct FaultText {
   char text[512];
 };
+
+/// Stores as much of a text as fits, and a zero behind it.
+template <std::size_t Size>
+void store_text(char (&to)[Size], std::string_view text) noexcept {
+  const std::size_t size = text.size() < Size ? text.size() : Size - 1;
+  if (size > 0) std::memcpy(to, text.data(), size);
+  to[size] = 0;
+}
 
 /// One option with which a robot can be started.
 struct OptionRow {

@@ -30,10 +30,6 @@ struct Served {
   /// one request of a kind runs: another one is rejected without a call of the handler.
   static Served running(std::string_view progress = {}) { return with(Kind::running, progress); }
 
-  /// The reason of a rejection or failure, or the progress of a running request.
-  std::string_view why() const { return {text.data(), strnlen(text.data(), text.size())}; }
-
- private:
   static Served with(Kind kind, std::string_view why) {
     Served served;
     served.kind = kind;
@@ -41,6 +37,9 @@ struct Served {
     if (size > 0) std::memcpy(served.text.data(), why.data(), size);
     return served;
   }
+
+  /// The reason of a rejection or failure, or the progress of a running request.
+  std::string_view why() const { return {text.data(), strnlen(text.data(), text.size())}; }
 };
 
 /// A snapshot of a robot.

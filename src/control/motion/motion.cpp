@@ -82,23 +82,18 @@ Motion::Motion(const Schema& schema, const ActuatorRow& actuator, const StateLay
 }
 
 std::int64_t Motion::propose(const Course& course, const std::byte* desired) noexcept {
-  profile_ = course.profile;
-  is_row_ = course.is_row;
-  next_row_ = course.next;
-  next_iterations_ = course.next_iterations;
-  is_first_row_ = course.is_first;
-  row_after_ = course.after;
+  course_ = course;
   const bool first_row = std::exchange(begun_, false);
   // a row begins at the row before it
-  if (first_row || !is_row_) layout_.copy(from(), desired);
+  if (first_row || !course_.is_row) layout_.copy(from(), desired);
   const std::byte* observed = first_row ? std::exchange(observed_, nullptr) : nullptr;
   starts_observed_ = observed != nullptr;
   if (starts_observed_) layout_.copy_finite(from(), observed);
-  if (is_row_ && profile_ == Profile::hold) layout_.copy(from(), target());
+  if (course_.is_row && course_.profile == Profile::hold) layout_.copy(from(), target());
 
   std::int64_t longest = std::max<std::int64_t>(1, course.iterations);
   slowest_ = {};
-  const bool by_speed = (is_row_ || numbers_.empty()) && std::isfinite(course.cruise);
+  const bool by_speed = (course_.is_row || numbers_.empty()) && std::isfinite(course.cruise);
   if (by_speed) longest = 1;
   if (by_speed && course.first != StateLayout::kNoNumber) {
     // a row, or a type that blends by itself, at the speed asked for
@@ -110,7 +105,7 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
   }
   requested_by_speed_ = longest;
   for (Number& each : numbers_) {
-    if (!each.is_commanded || is_row_) continue;
+    if (!each.is_commanded || course_.is_row) continue;
     Requested requested = course;
     requested.target = layout_.number(each.number, target());
     requested.line_start = start_of(each);
@@ -134,22 +129,24 @@ void Motion::to_row(Number& number, std::int64_t iterations) noexcept {
     number.motion.start_from({start_of(number)}, false);
   }
   const double row = layout_.number(number.number, target());
-  if (profile_ == Profile::hold) return number.motion.jump_on(row);
-  if (profile_ == Profile::linear) return number.motion.line_on(row, iterations);
+  if (course_.profile == Profile::hold) return number.motion.jump_on(row);
+  if (course_.profile == Profile::linear) return number.motion.line_on(row, iterations);
   RowsAhead ahead;
-  if (next_iterations_ > 0) {
-    ahead = {layout_.number(number.number, next_row_), next_iterations_, is_first_row_};
-    ahead.after = row_after_ == nullptr ? ahead.next : layout_.number(number.number, row_after_);
+  if (course_.next_iterations > 0) {
+    ahead = {layout_.number(number.number, course_.next), course_.next_iterations,
+             course_.is_first};
+    ahead.after =
+        course_.after == nullptr ? ahead.next : layout_.number(number.number, course_.after);
   }
-  number.motion.curve_on(profile_, row, iterations, ahead);
+  number.motion.curve_on(course_.profile, row, iterations, ahead);
 }
 
 /// Types that blend by themselves: by the share of the time, from rest to rest.
 void Motion::blend(Iteration now, std::byte* state) noexcept {
-  if (now >= last_ || profile_ == Profile::hold) return layout_.copy(state, target());
+  if (now >= last_ || course_.profile == Profile::hold) return layout_.copy(state, target());
   const auto i = static_cast<double>(now - first_ + 1);
   const std::int64_t iterations = last_ - first_ + 1;
-  const double share = profile_ == Profile::minimum_jerk
+  const double share = course_.profile == Profile::minimum_jerk
                            ? SmoothMotion({}, 1.0, iterations).position(i)
                            : i / static_cast<double>(iterations);
   std::byte* blended = target() + stride_;

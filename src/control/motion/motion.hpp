@@ -83,7 +83,7 @@ class Motion {
     last_ = first + (iterations - 1);
     for (Number& each : numbers_) {
       if (!each.is_commanded) continue;
-      if (is_row_) {
+      if (course_.is_row) {
         to_row(each, iterations);
       } else {
         each.motion.settle(iterations);
@@ -93,7 +93,7 @@ class Motion {
   /// A set-point of a generator at the rate of the loop: no plan, only limits.
   void follow_as_sent(Iteration first) noexcept {
     first_ = last_ = first;
-    begun_ = is_row_ = false;
+    begun_ = course_.is_row = false;
     for (Number& each : numbers_) {
       if (each.is_commanded) each.motion.follow_as_sent(layout_.number(each.number, target()));
     }
@@ -116,7 +116,7 @@ class Motion {
   }
   /// True if what settle() planned last is the way to a row, and a limit can keep it from there.
   bool follows_rows() const noexcept {
-    return is_row_ && std::ranges::any_of(numbers_, [](auto& each) {
+    return course_.is_row && std::ranges::any_of(numbers_, [](auto& each) {
              return each.is_commanded && each.motion.has_rates();
            });
   }
@@ -267,16 +267,10 @@ class Motion {
   std::vector<std::uint32_t> switches_;  // numbers that switch at the start
   Iteration first_ = 0;
   Iteration last_ = 0;
-  Profile profile_ = Profile::linear;
+  Course course_;  // of the last propose()
   const std::byte* observed_ = nullptr;
   bool starts_observed_ = false;  // what propose() planned last
   bool has_integrals_ = false;
-  bool is_row_ = false;
-  // as in Course
-  const std::byte* next_row_ = nullptr;
-  std::int64_t next_iterations_ = 0;
-  bool is_first_row_ = false;
-  const std::byte* row_after_ = nullptr;
   bool begun_ = false;  // the next row begins a command
   std::int64_t requested_by_speed_ = 1;
   Limited slowest_;

@@ -109,7 +109,6 @@ double NumberLimiter::goal(double step, double lag, const Span& accelerations) c
 }
 
 Limit NumberLimiter::follow_with_jerk(double step, double lag) noexcept {
-  know_stop();
   const double tolerance = slack();
   const Span allowed = accelerations();
 

@@ -68,7 +68,7 @@ class NumberLimiter {
   void restart(double position) noexcept {
     now_.position = position;
     begin(bounds_);
-    stop_now();
+    rest();
   }
   /// It does not move any more.
   void rest() noexcept {
@@ -209,15 +209,11 @@ class NumberLimiter {
     return {-now_.speed, now_.acceleration, rates_};
   }
   void slow_down() noexcept;
-  void stop_now() noexcept {
-    now_.speed = now_.acceleration = 0.0;
-    know_stop({});
-  }
   /// Treats a speed within rounding as 0.
   void forget_rounding() noexcept {
     const double nothing = slack() / 100.0 + 2.0 * rounding();
     const bool steady = !std::isfinite(rates_.jerk) || std::abs(now_.acceleration) <= nothing;
-    if (steady && std::abs(now_.speed) <= nothing) stop_now();
+    if (steady && std::abs(now_.speed) <= nothing) rest();
   }
   Span speeds() const noexcept;
   /// The next accelerations that the limits of acceleration and jerk allow.

@@ -121,19 +121,10 @@ bool DriverInstance::read(ReadingView& reading) noexcept {
   return table_.read(driver_, &reading, &fault_) == 0;
 }
 
+/// What a driver answered; an unknown answer is a failure.
 Served DriverInstance::served(RequestAnswer answer, std::string_view text) noexcept {
-  switch (answer) {
-    case RequestAnswer::done:
-      return Served::done();
-    case RequestAnswer::rejected:
-      return Served::rejected(text);
-    case RequestAnswer::start_afresh:
-      return Served::start_afresh();
-    case RequestAnswer::running:
-      return Served::running(text);
-    default:
-      return Served::failed(text);
-  }
+  if (answer > RequestAnswer::running) answer = RequestAnswer::failed;
+  return Served::with(static_cast<Served::Kind>(answer), text);
 }
 
 Served DriverInstance::served(const RequestReport& report) noexcept {

@@ -35,6 +35,19 @@ fs::path bundled_folder() {
   return library.parent_path() / "o80" / "robots";
 }
 
+/// Those of O80_ROBOT_PATH first.
+std::vector<std::string> robot_folders() {
+  std::vector<std::string> folders;
+  if (const char* given = secure_getenv("O80_ROBOT_PATH"); given != nullptr) {
+    std::istringstream parts(given);
+    for (std::string folder; std::getline(parts, folder, ':');) {
+      if (!folder.empty()) folders.push_back(folder);
+    }
+  }
+  folders.push_back(bundled_folder().string());
+  return folders;
+}
+
 /// True if the file is a library that exports the table of a robot. Only reads it: loading would
 /// run code of a library that may be no robot.
 bool is_robot_library(const fs::path& path) {
@@ -163,18 +176,6 @@ std::string no_such_robot(const std::string& name, const std::vector<std::string
   return why +
          " `o80 run` lists all robots. For a library, give its path (for one in this folder: "
          "./NAME.so), or add its folder to O80_ROBOT_PATH";
-}
-
-std::vector<std::string> robot_folders() {
-  std::vector<std::string> folders;
-  if (const char* given = secure_getenv("O80_ROBOT_PATH"); given != nullptr) {
-    std::istringstream parts(given);
-    for (std::string folder; std::getline(parts, folder, ':');) {
-      if (!folder.empty()) folders.push_back(folder);
-    }
-  }
-  folders.push_back(bundled_folder().string());
-  return folders;
 }
 
 std::vector<RobotFile> find_robots() {

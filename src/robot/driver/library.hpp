@@ -12,16 +12,13 @@ struct RobotLibrary {
   std::string path;
   const RobotTable* table = nullptr;
 
-  /// Loads a robot by path, or by name from robot_folders().
+  /// Loads a robot by path, or by name (find_robots()).
   /// Throws DriverError with the known robots in its text.
   static RobotLibrary load(const std::string& name_or_path);
 };
 
-/// The folders in which robots are found by name: those of O80_ROBOT_PATH (separated by ':'), then
-/// the folder of the robots that come with o80.
-std::vector<std::string> robot_folders();
-
-/// Name and path of a robot library in these folders.
+/// Name and path of a robot library in the folders in which robots are found by name: those of
+/// O80_ROBOT_PATH (separated by ':'), then that of the robots that come with o80.
 struct RobotFile {
   std::string name;
   std::string path;

@@ -1,7 +1,10 @@
 #include "robot/group/descriptor_limit.hpp"
 
-#include <dirent.h>
 #include <sys/resource.h>
+
+#include <filesystem>
+#include <iterator>
+#include <system_error>
 
 #include "o80/base/error.hpp"
 
@@ -13,12 +16,9 @@ constexpr rlim_t kSpare = 64;  // for the program itself
 
 /// Number of files that this process has open, or a cautious guess without /proc.
 rlim_t open_files() {
-  DIR* directory = opendir("/proc/self/fd");
-  if (directory == nullptr) return 256;
-  rlim_t count = 0;
-  while (readdir(directory) != nullptr) ++count;
-  closedir(directory);
-  return count;
+  std::error_code error;
+  const std::filesystem::directory_iterator files("/proc/self/fd", error);
+  return error ? 256 : static_cast<rlim_t>(std::distance(begin(files), end(files)));
 }
 
 }  // namespace

@@ -61,6 +61,13 @@ std::string text_of(const std::string& group, const std::vector<CopyFailed::Fail
   return text;
 }
 
+/// The part of one copy in memory that has a part for each of `copies`.
+template <class Bytes>
+Bytes part_of(Bytes all, std::size_t copies, std::size_t copy) {
+  const std::size_t size = all.size() / copies;
+  return all.subspan(copy * size, size);
+}
+
 void refuse_size(const char* what, std::size_t given, std::size_t wanted, const char* unit) {
   if (given == wanted) return;
   throw InvalidArgument(std::string("the ") + what + " of a call of a group take " +
@@ -85,10 +92,12 @@ struct InlineGroup::Copy {
   bool chosen = false;             // for this call
 };
 
-/// Marks the group as running while it lives.
+/// Marks the group as running while it lives: in a call of its own, or in that of a `leader`, which
+/// has claimed the threads.
 class InlineGroup::Call {
  public:
-  explicit Call(InlineGroup& group) : group_(group), outer_(innermost_) {
+  explicit Call(InlineGroup& group, InlineGroup* leader = nullptr)
+      : group_(group), outer_(innermost_) {
     group.check_usable();
     std::uint32_t free = 0;
     if (!group.running_.compare_exchange_strong(free, 1, std::memory_order_acquire)) {
@@ -96,17 +105,20 @@ class InlineGroup::Call {
                   "' runs a call of another thread (or is this a signal handler?): call it from "
                   "one thread at a time");
     }
-    if (!group.pool_->try_claim()) {
+    if (leader == nullptr && !group.pool_->try_claim()) {
       group.running_.store(0, std::memory_order_release);
       throw Error("the threads of the group of '" + group.name_ +
                   "' run a call of the group that it shares them with: call one after the other");
     }
+    group.leader_.store(leader, std::memory_order_relaxed);
     innermost_ = this;
   }
   Call& operator=(Call&&) = delete;
   ~Call() {
     innermost_ = outer_;
-    group_.pool_->release();
+    if (group_.leader_.exchange(nullptr, std::memory_order_relaxed) == nullptr) {
+      group_.pool_->release();
+    }
     group_.running_.store(0, std::memory_order_release);
   }
   /// True if this thread has called the group and the call has not returned: in a signal handler.
@@ -121,30 +133,6 @@ class InlineGroup::Call {
 
   InlineGroup& group_;
   const Call* outer_;
-};
-
-/// Marks a group as running in the call of another one, while it lives.
-class InlineGroup::FollowingCall {
- public:
-  FollowingCall(InlineGroup& leader, InlineGroup* group) : group_(group) {
-    if (group_ == nullptr) return;
-    group_->check_usable();
-    std::uint32_t free = 0;
-    if (!group_->running_.compare_exchange_strong(free, 1, std::memory_order_acquire)) {
-      throw Error("the group of '" + group_->name_ + "' runs a call of another thread: call it " +
-                  "from one thread at a time");
-    }
-    group_->leader_.store(&leader, std::memory_order_relaxed);
-  }
-  FollowingCall& operator=(FollowingCall&&) = delete;
-  ~FollowingCall() {
-    if (group_ == nullptr) return;
-    group_->leader_.store(nullptr, std::memory_order_relaxed);
-    group_->running_.store(0, std::memory_order_release);
-  }
-
- private:
-  InlineGroup* group_;
 };
 
 BackendOptions InlineGroup::default_options() {
@@ -267,7 +255,8 @@ void InlineGroup::poll() noexcept {
   if (cancelled || timed_out_) cancelled_.store(true, std::memory_order_relaxed);
 }
 
-/// Calls each(place, copy) for the chosen copies, on all threads; `place` is that in `chosen`.
+/// Calls each(place, copy) for the chosen copies, on all threads: the place in `chosen`, and there
+/// the number of the copy.
 template <class Each>
 void InlineGroup::for_each(std::span<const std::uint32_t> chosen, Timeout timeout,
                            const KeepWaiting& keep_waiting, Each&& each) {
@@ -279,12 +268,11 @@ void InlineGroup::for_each(std::span<const std::uint32_t> chosen, Timeout timeou
   caller_ = std::this_thread::get_id();
   const auto task = [&](std::uint32_t place) noexcept {
     if (cancelled_.load(std::memory_order_relaxed)) return;
-    Copy& copy = *copies_[chosen[place]];
     const InlineGroup* const before = std::exchange(working_for, this);
     try {
-      each(place, copy);
+      each(place, chosen[place]);
     } catch (...) {
-      copy.error = std::current_exception();
+      copies_[chosen[place]]->error = std::current_exception();
       failed_.store(true, std::memory_order_relaxed);
     }
     working_for = before;
@@ -387,8 +375,7 @@ void InlineGroup::check_following(const BurstPlan& plan) const {
 void InlineGroup::burst(const BurstPlan& plan, std::span<const std::uint32_t> chosen,
                         Timeout timeout, const KeepWaiting& keep_waiting, const Instead& instead) {
   const Following* const then = plan.then;
-  const std::size_t size = instead.payloads.size() / copies();
-  const auto payload_of = [&](std::uint32_t i) { return instead.payloads.subspan(i * size, size); };
+  const auto payload_of = [&](std::uint32_t i) { return part_of(instead.payloads, copies(), i); };
   if (!instead.copies.empty()) {
     if (then != nullptr) throw InvalidArgument("a burst that another one follows takes no request");
     refuse_size("choice", instead.copies.size(), copies(), "flags");
@@ -399,14 +386,12 @@ void InlineGroup::burst(const BurstPlan& plan, std::span<const std::uint32_t> ch
   }
   const bool may_be_direct = this->may_be_direct(plan);
   const bool follows_directly = then != nullptr && then->group->may_be_direct(*then->plan);
-  const FollowingCall following(*this, then == nullptr ? nullptr : then->group);
-  for_each(chosen, timeout, keep_waiting, [&](std::uint32_t place, Copy&) {
-    const std::uint32_t i = chosen[place];
+  std::optional<Call> following;
+  if (then != nullptr) following.emplace(*then->group, this);
+  for_each(chosen, timeout, keep_waiting, [&](std::uint32_t, std::uint32_t i) {
     if (!instead.copies.empty() && instead.copies[i] != 0) {
       request_copy(instead.request, payload_of(i), i);
-      const std::size_t rows = plan.rows.size() / copies();
-      show_last_row(i, plan.rows.subspan(i * rows, rows));
-      return;
+      return show_last_row(i, part_of(plan.rows, copies(), i));
     }
     burst_copy(plan, may_be_direct, i);
     if (then != nullptr) follow(plan, follows_directly, i);
@@ -424,10 +409,8 @@ void InlineGroup::BurstPlan::add_targets(UntypedFrontend& frontend,
 
 void InlineGroup::burst_copy(const BurstPlan& plan, bool may_be_direct, std::uint32_t i) {
   Copy& copy = *copies_[i];
-  const std::size_t targets = plan.targets.size() / copies();
-  const std::size_t rows = plan.rows.size() / copies();
-  const std::span<const std::byte> to = plan.targets.subspan(i * targets, targets);
-  const std::span<std::byte> own = plan.rows.subspan(i * rows, rows);
+  const std::span<const std::byte> to = part_of(plan.targets, copies(), i);
+  const std::span<std::byte> own = part_of(plan.rows, copies(), i);
   try {
     if (!may_be_direct || !burst_directly(copy, plan, to, own)) {
       if (!plan.actuators.empty()) plan.add_targets(copy.frontend, to);
@@ -439,10 +422,11 @@ void InlineGroup::burst_copy(const BurstPlan& plan, bool may_be_direct, std::uin
     show_last_row(i, own);
     throw;
   }
-  read_gathered(i, own.data() + rows - description().layout.size);
+  read_gathered(i, own.data() + own.size() - description().layout.size);
 }
 
-/// After a request, or a halt that has ended a burst: all that a copy shows is its last row.
+/// After a request, or a halt that has ended a burst: all that a copy shows is its last row, in
+/// each of `rows`.
 void InlineGroup::show_last_row(std::uint32_t i, std::span<std::byte> rows) {
   Copy& copy = *copies_[i];
   const std::size_t size = description().layout.size;
@@ -457,8 +441,8 @@ void InlineGroup::show_last_row(std::uint32_t i, std::span<std::byte> rows) {
 void InlineGroup::follow(const BurstPlan& plan, bool may_be_direct, std::uint32_t i) {
   const Following& then = *plan.then;
   const std::size_t size = description().layout.size;
-  const std::byte* rows = plan.rows.data() + i * (plan.rows.size() / copies());
-  std::byte* targets = then.plan->targets.data() + i * (then.plan->targets.size() / copies());
+  const std::byte* rows = part_of(plan.rows, copies(), i).data();
+  std::byte* targets = part_of(then.plan->targets, copies(), i).data();
   for (const Feed& feed : then.feeds) {
     for (std::size_t step = 0; step < then.plan->steps; ++step) {
       std::byte* to = targets + feed.to + step * feed.stride;
@@ -508,18 +492,14 @@ void InlineGroup::request(std::uint32_t request, std::span<const std::uint32_t> 
                           std::span<const std::byte> payloads, Timeout timeout,
                           const KeepWaiting& keep_waiting, std::span<std::byte> rows) {
   check_usable();
-  const std::size_t row = description().layout.size;
-  if (!rows.empty()) refuse_size("rows", rows.size(), copies() * row, "bytes");
-  const std::size_t size = payloads.size() / std::max<std::size_t>(1, chosen.size());
+  const std::size_t wanted = rows.empty() ? 0 : copies() * description().layout.size;
+  refuse_size("rows", rows.size(), wanted, "bytes");
+  const auto payload_of = [&](std::size_t i) { return part_of(payloads, chosen.size(), i); };
   const CommandCheck& robot = copies_.front()->frontend.command_check();
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    robot.request(request, payloads.subspan(i * size, size));
-  }
-  for_each(chosen, timeout, keep_waiting, [&](std::uint32_t place, Copy&) {
-    request_copy(request, payloads.subspan(place * size, size), chosen[place]);
-    const std::span<std::byte> newest =
-        rows.empty() ? rows : rows.subspan(chosen[place] * row, row);
-    show_last_row(chosen[place], newest);
+  for (std::size_t i = 0; i < chosen.size(); ++i) robot.request(request, payload_of(i));
+  for_each(chosen, timeout, keep_waiting, [&](std::uint32_t place, std::uint32_t i) {
+    request_copy(request, payload_of(place), i);
+    show_last_row(i, part_of(rows, copies(), i));
   });
 }
 
@@ -557,7 +537,8 @@ void InlineGroup::resume(std::span<const std::uint32_t> chosen, Timeout timeout,
   std::ranges::copy_if(chosen, std::back_inserter(halted),
                        [&](std::uint32_t i) { return at(i).frontend.halted().has_value(); });
   if (halted.empty()) return;
-  for_each(halted, timeout, keep_waiting, [&](std::uint32_t place, Copy& copy) {
+  for_each(halted, timeout, keep_waiting, [&](std::uint32_t, std::uint32_t i) {
+    Copy& copy = *copies_[i];
     // the braking has ended in the iteration after the first row that shows none
     for (bool is_at_rest = false; !is_at_rest; copy.frontend.burst(1, {}, may_continue_)) {
       const UntypedObservation row = copy.frontend.latest();
@@ -565,8 +546,7 @@ void InlineGroup::resume(std::span<const std::uint32_t> chosen, Timeout timeout,
     }
     const std::optional<Halt> halt = copy.frontend.halted();
     if (halt) copy.frontend.resume(halt->number, {}, may_continue_);
-    copy.frontend.latest(copy.bytes());
-    read_gathered(halted[place], copy.bytes());
+    show_last_row(i, {});
   });
 }
 
@@ -587,10 +567,7 @@ void InlineGroup::gather(RowGather gather, Gathered memory) {
   const Call call(*this);
   gather_ = std::move(gather);
   gathered_ = memory;
-  for (std::uint32_t i = 0; i < copies_.size(); ++i) {
-    copies_[i]->frontend.latest(copies_[i]->bytes());
-    read_gathered(i, copies_[i]->bytes());
-  }
+  for (std::uint32_t i = 0; i < copies_.size(); ++i) show_last_row(i, {});
 }
 
 void InlineGroup::read_gathered(std::uint32_t copy, const std::byte* row) noexcept {

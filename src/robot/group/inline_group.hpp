@@ -165,7 +165,6 @@ class InlineGroup {
  private:
   struct Copy;
   class Call;
-  class FollowingCall;
 
   void add_copy(const RobotTable& table, const OptionValues& options,
                 const BackendOptions& backend);

@@ -1,13 +1,16 @@
 #include "robot/group/worker_pool.hpp"
 
 #include <pthread.h>
-#include <signal.h>
 
 #include <algorithm>
+#include <string>
+#include <system_error>
 #include <utility>
 
+#include "base/signals_blocked.hpp"
 #include "memory/os/futex.hpp"
 #include "memory/segment/signal.hpp"
+#include "o80/base/error.hpp"
 
 namespace o80 {
 
@@ -20,12 +23,18 @@ constexpr std::int64_t kSpin = 300'000;
 }  // namespace
 
 WorkerPool::WorkerPool(std::size_t workers) : shares_(workers + 1) {
-  sigset_t every, before;
-  sigfillset(&every);
-  pthread_sigmask(SIG_BLOCK, &every, &before);
+  const SignalsBlocked blocked;
   threads_.reserve(workers);
-  for (std::size_t i = 0; i < workers; ++i) threads_.emplace_back([this, i] { work(i + 1); });
-  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  try {
+    while (threads_.size() < workers) {
+      threads_.emplace_back([this, own = threads_.size() + 1] { work(own); });
+    }
+  } catch (const std::system_error& error) {
+    stop();
+    throw Error("only " + std::to_string(threads_.size()) + " of " + std::to_string(workers) +
+                " threads besides the caller's can be started (" + error.what() +
+                "): use fewer threads, or raise their limit (`ulimit -u`)");
+  }
 }
 
 WorkerPool::~WorkerPool() {
@@ -35,6 +44,10 @@ WorkerPool::~WorkerPool() {
     static_cast<void>(new std::vector<std::thread>(std::move(threads_)));
     return;
   }
+  stop();
+}
+
+void WorkerPool::stop() noexcept {
   stop_.store(true, std::memory_order_relaxed);
   round_.fetch_add(1, std::memory_order_release);  // sync round
   futex_wake(round_, kEverybody);

@@ -23,7 +23,7 @@ namespace o80 {
 /// Realtime: no; run() allocates nothing.
 class WorkerPool {
  public:
-  /// `workers`: threads besides the caller.
+  /// `workers`: threads besides the caller. Throws Error if so many cannot be started.
   explicit WorkerPool(std::size_t workers);
   WorkerPool& operator=(WorkerPool&&) = delete;
   /// In a forked child it leaves the threads of the parent alone.
@@ -57,6 +57,7 @@ class WorkerPool {
  private:
   using Call = void (*)(const void* object, std::uint32_t i);
 
+  void stop() noexcept;
   void begin(std::uint32_t count, Call call, const void* object) noexcept;
   bool take(std::uint32_t round, std::size_t own, std::uint32_t& i) noexcept;
   /// True if it was the last task of the call.

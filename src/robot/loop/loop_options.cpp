@@ -167,6 +167,14 @@ bool read_number(const LoopOption& option, std::string_view text, double& number
 
 }  // namespace
 
+std::string text_of(std::span<const int> processors) {
+  std::string text;
+  for (const int processor : processors) {
+    text += (text.empty() ? "" : ",") + std::to_string(processor);
+  }
+  return text;
+}
+
 std::span<const LoopOption> loop_options() { return kOptions; }
 
 const LoopOption* find_loop_option(std::string_view name) {

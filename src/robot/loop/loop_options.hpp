@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "o80/robot/real_time.hpp"
@@ -43,7 +44,15 @@ struct LoopOption {
   bool (*set)(LoopOptions& options, std::string_view text, double number);
 
   bool is_switch() const { return kind == Kind::boolean; }
+  const char* kind_name() const {
+    constexpr const char* kNames[] = {"text", "number", "integer", "boolean",
+                                      "word", "octal",  "list"};
+    return kNames[static_cast<std::size_t>(kind)];
+  }
 };
+
+/// The text of a list of processors: "2,3".
+std::string text_of(std::span<const int> processors);
 
 std::span<const LoopOption> loop_options();
 /// Null for an unknown name.

@@ -1,13 +1,13 @@
 #include "robot/loop/loop_report.hpp"
 
 #include <pthread.h>
-#include <signal.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <utility>
 
+#include "base/signals_blocked.hpp"
 #include "memory/os/futex.hpp"
 #include "o80/base/time.hpp"
 #include "o80/runtime/frontend.hpp"
@@ -57,15 +57,10 @@ std::optional<std::string> HangReport::poll(const LoopState& loop, std::int64_t 
 }
 
 LoopReport::LoopReport(std::string segment) : segment_(std::move(segment)) {
-  // signals are for the loop's thread
-  sigset_t every;
-  sigset_t before;
-  sigfillset(&every);
-  pthread_sigmask(SIG_BLOCK, &every, &before);
+  const SignalsBlocked blocked;
   thread_ = std::thread([this] { run(); });
   const sched_param ordinary{};
   pthread_setschedparam(thread_.native_handle(), SCHED_OTHER, &ordinary);
-  pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
 LoopReport::~LoopReport() {

@@ -92,10 +92,8 @@ bool Loop::read_first() {
 bool Loop::begin() { return backend_.publish() || cannot_begin(); }
 
 bool Loop::cannot_begin() {
-  fault_ = "'";
-  fault_ += robot_->table().name;
-  fault_ += "' cannot begin: ";
-  fault_ += backend_.failure();
+  fault_ = "'" + std::string(robot_->table().name) +
+           "' cannot begin: " + std::string(backend_.failure());
   return false;
 }
 

@@ -10,6 +10,7 @@
 
 #include "memory/segment/liveness.hpp"
 #include "robot/driver/machine_limits.hpp"
+#include "robot/loop/loop_options.hpp"
 #include "robot/loop/realtime_kit.hpp"
 
 namespace o80 {
@@ -28,14 +29,6 @@ std::string allowed_by(const MachineLimit& limit) {
 __attribute__((noinline)) void touch_stack(std::size_t bytes) {
   auto* stack = static_cast<volatile char*>(alloca(bytes));
   for (std::size_t i = 0; i < bytes; i += kPage) stack[i] = 0;
-}
-
-std::string list(const std::vector<int>& processors) {
-  std::string text;
-  for (const int processor : processors) {
-    text += (text.empty() ? "" : ",") + std::to_string(processor);
-  }
-  return text;
 }
 
 void set_policy(const RealTimeOptions& options, std::vector<std::string>& refused) {
@@ -66,16 +59,10 @@ void set_policy(const RealTimeOptions& options, std::vector<std::string>& refuse
                     allowed_by(kPriorityLimit));
 }
 
-bool is_in(int processor, const cpu_set_t& set) {
-  return processor >= 0 && processor < CPU_SETSIZE && CPU_ISSET(processor, &set);
-}
-
 void set_processors(const RealTimeOptions& options, std::vector<std::string>& refused) {
   cpu_set_t set;
   CPU_ZERO(&set);
-  for (const int processor : options.processors) {
-    if (processor >= 0 && processor < CPU_SETSIZE) CPU_SET(processor, &set);
-  }
+  for (const int processor : options.processors) CPU_SET(processor, &set);  // if it is in range
   LaneLiveness::avoid_processors(options.processors);
   std::vector<int> missing = options.processors;
   std::string why = "the others are used";
@@ -83,10 +70,10 @@ void set_processors(const RealTimeOptions& options, std::vector<std::string>& re
     why = std::strerror(errno);
   } else if (sched_getaffinity(0, sizeof set, &set) == 0) {
     // the kernel accepts a list if one processor exists, and silently drops the others
-    std::erase_if(missing, [&](int processor) { return is_in(processor, set); });
+    std::erase_if(missing, [&](int processor) { return CPU_ISSET(processor, &set); });
   }
   if (missing.empty()) return;
-  refused.push_back("processors " + list(missing) + " were refused (" + why +
+  refused.push_back("processors " + text_of(missing) + " were refused (" + why +
                     "). This machine has " + std::to_string(sysconf(_SC_NPROCESSORS_ONLN)) +
                     ": `lscpu` lists them, `taskset -p $$` those that may be used");
 }

@@ -103,10 +103,7 @@ Provenance::Options texts_of(const RealTimeOptions& options) {
                             {"lock_memory", options.lock_memory ? "true" : "false"}};
   if (options.policy != RealTimeOptions::Policy::other)
     texts.emplace_back("priority", std::to_string(options.priority));
-  std::string processors;
-  for (const int processor : options.processors)
-    processors += (processors.empty() ? "" : ",") + std::to_string(processor);
-  if (!processors.empty()) texts.emplace_back("cpus", processors);
+  if (!options.processors.empty()) texts.emplace_back("cpus", text_of(options.processors));
   return texts;
 }
 

@@ -21,6 +21,7 @@
 #include <thread>
 
 #include "base/printable.hpp"
+#include "base/signals_blocked.hpp"
 #include "describe/number_name.hpp"
 #include "memory/os/descriptors.hpp"
 #include "memory/segment/owned_segment.hpp"
@@ -144,11 +145,7 @@ class Running {
 
 /// Stops the loop at the end of the standard input, that is, when the starting process has ended.
 void watch_input() {
-  // signals are for the loop's thread
-  sigset_t every;
-  sigset_t before;
-  sigfillset(&every);
-  pthread_sigmask(SIG_BLOCK, &every, &before);
+  const SignalsBlocked blocked;
   std::thread([] {
     char byte;
     ssize_t got = 0;
@@ -157,7 +154,6 @@ void watch_input() {
     const std::scoped_lock lock(ending);
     stop_on_signal(0);
   }).detach();
-  pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
 /// Prints to the standard error, after what the driver has printed so far.

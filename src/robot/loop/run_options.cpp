@@ -1,44 +1,77 @@
 #include "robot/loop/run_options.hpp"
 
-#include <getopt.h>
-
 #include <algorithm>
 #include <iomanip>
+#include <optional>
 #include <sstream>
+#include <string_view>
 #include <vector>
 
 #include "o80/base/error.hpp"
-#include "robot/loop/flag_errors.hpp"
+#include "o80/base/nearest_name.hpp"
 
 namespace o80 {
 
 namespace {
-
-/// What getopt_long returns for the first option; above the characters ':' and '?', which it
-/// returns for errors.
-constexpr int kFirstOption = 256;
 
 std::string dashed(std::string name) {
   std::ranges::replace(name, '_', '-');
   return name;
 }
 
-/// The kind of value that follows a flag, for the help.
-std::string value_of(const LoopOption& option) {
-  switch (option.kind) {
-    case LoopOption::Kind::boolean:
-      return "";
-    case LoopOption::Kind::word:
-      return " word";
-    case LoopOption::Kind::octal:
-      return " octal";
-    case LoopOption::Kind::list:
-      return " list";
-    case LoopOption::Kind::text:
-      return " text";
-    default:
-      return option.kind == LoopOption::Kind::integer ? " integer" : " number";
+/// A flag of the command line: a loop option, or an option of the robot's Config.
+struct Flag {
+  std::string option;
+  std::string name = dashed(option);    // without the two dashes before it
+  const LoopOption* of_loop = nullptr;  // null: the robot's
+
+  bool is_switch() const { return of_loop != nullptr && of_loop->is_switch(); }
+};
+
+std::vector<Flag> flags_of(const RobotTable& table) {
+  std::vector<Flag> flags;
+  for (const LoopOption& option : loop_options()) {
+    flags.push_back({.option = option.name, .of_loop = &option});
   }
+  for (const Option& own : options_of(table)) {
+    if (find_loop_option(own.name) != nullptr) {
+      throw InvalidArgument("robot '" + std::string(table.name) + "' has an option '" + own.name +
+                            "', which is a flag of every robot: rename it in its Config");
+    }
+    flags.push_back({.option = own.name});
+  }
+  return flags;
+}
+
+/// The flag of "--name" or "--name=value", whose name may be abbreviated and have underscores.
+const Flag& flag_of(std::string_view word, const std::vector<Flag>& flags) {
+  const std::string given(word.substr(0, word.find('=')));
+  const std::string name = dashed(given.substr(2));
+  const Flag* found = nullptr;
+  std::vector<std::string> names;
+  std::vector<std::string> begun;
+  for (const Flag& flag : flags) {
+    if (flag.name == name) return flag;
+    names.push_back(flag.name);
+    if (name.empty() || !flag.name.starts_with(name)) continue;
+    begun.push_back("--" + flag.name);
+    found = &flag;
+  }
+  if (begun.size() == 1) return *found;
+  if (begun.size() > 1) {
+    throw InvalidArgument(given + " may be " + first_names(begun) + ": write it out");
+  }
+  const std::string near = nearest_name(name, names);
+  throw InvalidArgument(
+      "there is no flag " + given +
+      (near.empty() ? "; see --help" : ". Did you mean --" + near + "? See --help"));
+}
+
+[[noreturn]] void refuse_word(std::string_view word) {
+  const bool flag_without_dashes = word.find('=') != std::string_view::npos;
+  throw InvalidArgument(
+      "'" + std::string(word) + "' is not a flag: flags begin with --" +
+      (flag_without_dashes ? ", for example --" + std::string(word) : "; see --help"));
 }
 
 std::string help_of(const LoopOption& option) {
@@ -55,63 +88,34 @@ void line(std::ostringstream& out, const std::string& flag, const std::string& h
 }  // namespace
 
 RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
-  // flags of the loop first, then those of the robot's Config, under both spellings
-  std::vector<std::string> names;
-  std::vector<std::string> robot_options;
-  std::vector<option> long_options;
-  for (const LoopOption& flag : loop_options()) names.push_back(dashed(flag.name));
-  for (const Option& own : options_of(table)) {
-    if (std::ranges::find(names, dashed(own.name)) != names.end()) {
-      throw InvalidArgument("robot '" + std::string(table.name) + "' has an option '" + own.name +
-                            "', which is a flag of every robot: rename it in its Config");
-    }
-    robot_options.push_back(own.name);
-  }
-  for (const std::string& own : robot_options) names.push_back(dashed(own));
-  const auto add = [&](const std::string& spelled, std::size_t i) {
-    const bool is_switch = i < loop_options().size() && loop_options()[i].is_switch();
-    long_options.push_back({spelled.c_str(), is_switch ? no_argument : required_argument, nullptr,
-                            kFirstOption + static_cast<int>(i)});
-  };
-  for (std::size_t i = 0; i < names.size(); ++i) add(names[i], i);
-  // the same number again: an abbreviation of both spellings is not ambiguous
-  for (std::size_t i = 0; i < robot_options.size(); ++i) {
-    add(robot_options[i], loop_options().size() + i);
-  }
-  long_options.push_back({nullptr, 0, nullptr, 0});
-
-  std::vector<std::string> switches;
-  for (const LoopOption& flag : loop_options()) {
-    if (flag.is_switch()) switches.push_back(dashed(flag.name));
-  }
-  const std::vector<std::string> words(argv, argv + argc);  // getopt_long changes their order
-
+  const std::vector<Flag> flags = flags_of(table);
   RunOptions options;
   options.backend.segment = table.name;
   options.real_time.priority = 80;
   bool has_priority = false;
-  opterr = 0;
-  optind = 0;  // begins anew, also after a command line that was refused half way
-  for (int chosen = 0;
-       (chosen = getopt_long(argc, argv, ":", long_options.data(), nullptr)) != -1;) {
-    if (chosen == ':') {
-      throw InvalidArgument(std::string(argv[optind - 1]) + " needs a value");
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (!word.starts_with("--")) refuse_word(word);
+    const Flag& flag = flag_of(word, flags);
+    std::optional<std::string_view> value;
+    if (const auto equals = word.find('='); equals != std::string_view::npos) {
+      value = word.substr(equals + 1);
+    } else if (i + 1 < argc && (!flag.is_switch() || argv[i + 1][0] != '-')) {
+      value = argv[++i];
     }
-    if (chosen == '?' || chosen < 0) {
-      throw InvalidArgument(refused_flag(argv[optind - 1], names, switches));
+    if (flag.is_switch() && value) {
+      throw InvalidArgument("--" + flag.name + " takes no value, got '" + std::string(*value) +
+                            "': give it without a value, or leave it out");
     }
-    const auto index = static_cast<std::size_t>(chosen - kFirstOption);
-    if (index < loop_options().size()) {
-      const char* text = optarg == nullptr ? "true" : optarg;
-      set_loop_option(options, loop_options()[index], text, "--" + names[index]);
-      has_priority = has_priority || names[index] == "priority";
-      options.has_policy = options.has_policy || names[index] == "policy";
-    } else {
-      options.robot.emplace_back(robot_options[index - loop_options().size()], optarg);
+    if (flag.is_switch()) value = "true";
+    if (!value) throw InvalidArgument(std::string(word) + " needs a value");
+    if (flag.of_loop == nullptr) {
+      options.robot.emplace_back(flag.option, *value);
+      continue;
     }
-  }
-  if (optind < argc) {
-    throw InvalidArgument(refused_word(argv[optind], words, switches));
+    set_loop_option(options, *flag.of_loop, *value, "--" + flag.name);
+    has_priority = has_priority || flag.option == "priority";
+    options.has_policy = options.has_policy || flag.option == "policy";
   }
   if (has_priority && options.real_time.policy == RealTimeOptions::Policy::other) {
     throw InvalidArgument(
@@ -134,7 +138,8 @@ std::string run_help(const RobotTable& table) {
   }
   out << "\nThe loop:\n";
   for (const LoopOption& flag : loop_options()) {
-    line(out, "--" + dashed(flag.name) + value_of(flag), help_of(flag));
+    const std::string value = flag.is_switch() ? "" : std::string(" ") + flag.kind_name();
+    line(out, "--" + dashed(flag.name) + value, help_of(flag));
   }
   return out.str();
 }

@@ -138,19 +138,14 @@ TEST(Table, RefusesWhatCannotBeUsed) {
               HasSubstr("jerk without an acceleration"));
   EXPECT_THAT(refusal([](Schema& s) { s.limits[0].acceleration = 1.0; }),
               HasSubstr("acceleration without a speed"));
-  for (const char* text : {"\xff", "a\x80", "\xc3", "\xc0\xaf", "\xe0\x80\xaf", "\xed\xa0\x80",
-                           "\xf4\x90\x80\x80", "\xe2\x82", "\xf5\x80\x80\x80"}) {
-    EXPECT_THAT(refusal([&](Schema& s) { s.types[0].name = NameText(text); }), HasSubstr("UTF-8"))
-        << text;
-  }
-  for (const char* text :
-       {"Gelenk", "\xc3\xa4rm", "\xe2\x82\xac", "\xf0\x9f\xa6\xbe", "\xed\x9f\xbf"}) {
-    EXPECT_EQ(refusal([&](Schema& s) { s.types[0].name = NameText(text); }), "") << text;
-  }
+  EXPECT_THAT(refusal([](Schema& s) { s.types[0].name = NameText("a\x80"); }), HasSubstr("UTF-8"));
   for (const Limits& limits : {Limits{.error = std::nan("")}, Limits{.noise = std::nan("")}}) {
-    EXPECT_THAT(refusal([&](Schema& s) { s.limits.push_back(limits.row()); }), HasSubstr("NaN"))
-        << "nor one that no actuator has: the schema would not equal itself";
+    EXPECT_THAT(refusal([&](Schema& s) { s.limits[0] = limits.row(); }), HasSubstr("limits of"));
   }
+  EXPECT_THAT(refusal([](Schema& s) { s.limits.push_back(Limits{}.row()); }),
+              HasSubstr("a limit belongs to no actuator"));
+  EXPECT_THAT(refusal([](Schema& s) { s.actuators[1].first_limit = 0; }),
+              HasSubstr("one limit for each number"));
   EXPECT_THAT(refusal([](Schema& s) { s.actuators[0].type = 99; }), HasSubstr("missing type"));
   EXPECT_THAT(refusal([](Schema& s) { s.actuators[8].offset = 4000; }),
               HasSubstr("outside the row"));
@@ -162,18 +157,13 @@ TEST(Table, RefusesWhatCannotBeUsed) {
 }
 
 TEST(Table, RefusesARestThatANumberCannotHave) {
-  const auto refusal_of = [](Kind kind, double rest) -> std::string {
+  const auto refusal_of = [](Kind kind, double rest) {
     Schema schema;
     schema.head.robot = NameText("tool");
     schema.add_actuators("tool", schema.add_type("Tool", {scalar_field("x", kind)}), 1, false);
     schema.head.block = 8;
     schema.actuator(0).rests_at("x", rest);
-    try {
-      check(schema);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+    return message_of<InvalidArgument>([&] { check(schema); });
   };
   EXPECT_THAT(refusal_of(Kind::boolean, 0), HasSubstr("'x' of actuator 'tool' cannot rest at 0.0"));
   EXPECT_THAT(refusal_of(Kind::uint8, -1), HasSubstr("a value that the field can hold"));

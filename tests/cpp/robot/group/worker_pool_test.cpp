@@ -2,11 +2,16 @@
 
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <fstream>
+#include <string>
 #include <thread>
 #include <vector>
+
+#include "o80/base/error.hpp"
 
 namespace o80::test {
 namespace {
@@ -119,6 +124,34 @@ TEST(WorkerPoolTest, WaitsForNoWorkerInAChildThatWasForkedWithinACall) {
   };
   pool.run(3, task, look);
   if (child == 0) _exit(7);
+  int status = -1;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_EQ(status, W_EXITCODE(7, 0));
+}
+
+TEST(WorkerPoolTest, EndsTheThreadsThatItHasStartedIfTheOthersCannotBe) {
+#ifdef __SANITIZE_THREAD__
+  GTEST_SKIP() << "needs a limit of memory, which the sanitizer does not survive";
+#endif
+  const pid_t child = fork();
+  if (child == 0) {
+    // memory for the stacks of a few threads
+    rlim_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    const rlim_t most = pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + (28U << 20);
+    const rlimit limit{most, most};
+    setrlimit(RLIMIT_AS, &limit);
+    std::string why;
+    try {
+      const WorkerPool pool(100);
+    } catch (const Error& error) {
+      why = error.what();
+    }
+    sigset_t blocked;
+    pthread_sigmask(SIG_BLOCK, nullptr, &blocked);
+    const bool is_said = why.find("of 100 threads") != std::string::npos;
+    _exit(is_said && sigismember(&blocked, SIGINT) == 0 ? 7 : 1);
+  }
   int status = -1;
   ASSERT_EQ(waitpid(child, &status, 0), child);
   EXPECT_EQ(status, W_EXITCODE(7, 0));

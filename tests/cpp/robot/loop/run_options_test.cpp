@@ -83,6 +83,7 @@ TEST_F(RunOptionsTest, RefuseWhatIsNotAllowedNamingTheFlag) {
   EXPECT_THAT(refusal({"--frequenzy=2"}), HasSubstr("no flag --frequenzy. Did you mean --freq"));
   EXPECT_THAT(refusal({"--la", "2"}), HasSubstr("--la may be --lanes, --lane-blocks"));
   EXPECT_THAT(refusal({"stray"}), HasSubstr("'stray' is not a flag"));
+  EXPECT_THAT(refusal({"--"}), HasSubstr("there is no flag --; see --help"));
   EXPECT_THAT(refusal({"gain=2"}), HasSubstr("for example --gain=2"));
   const char* const no_value = "--bursting takes no value, got '0'";
   EXPECT_THAT(refusal({"--bursting", "0"}), HasSubstr(no_value));
@@ -122,31 +123,6 @@ O80_DESCRIBE(Greedy::Config, lane_blocks);
 TEST_F(RunOptionsTest, RefuseARobotThatTakesAFlagOfEveryRobot) {
   EXPECT_THAT(message_of<InvalidArgument>([] { parse({}, *robot_table<Greedy>("greedy")); }),
               AllOf(HasSubstr("'lane_blocks'"), HasSubstr("rename it")));
-}
-
-/// A robot with more options than there are characters that getopt_long could mistake them for.
-RobotTable table_of_many_options() {
-  RobotTable table = *robot_table<Greedy>("settable");
-  table.options = [](void*, void* context, void (*each)(void*, const OptionRow*)) {
-    for (int i = 0; i < 40; ++i) {
-      const std::string name = "option_" + std::to_string(i);
-      const OptionRow row{name.c_str(), "int", "0", "", ""};
-      each(context, &row);
-    }
-  };
-  table.accepts = [](void*, const OptionValue*, std::uint32_t, FaultText*) { return 0; };
-  return table;
-}
-
-TEST_F(RunOptionsTest, EveryOneOfManyOptionsIsRead) {
-  const RobotTable table = table_of_many_options();
-  for (const Option& option : options_of(table)) {
-    for (const bool dashes : {true, false}) {
-      std::string word = "--" + option.name + "=7";
-      if (dashes) std::ranges::replace(word, '_', '-');
-      EXPECT_THAT(parse({word}, table).robot, ElementsAre(Pair(option.name, "7"))) << word;
-    }
-  }
 }
 
 }  // namespace
