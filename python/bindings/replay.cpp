@@ -6,7 +6,6 @@
 #include <string>
 
 #include "bindings.hpp"
-#include "buffer.hpp"
 #include "loop_options.hpp"
 #include "o80/runtime/observation.hpp"
 #include "open_replay.hpp"
@@ -51,22 +50,19 @@ void bind_replay(nb::module_& m) {
            "period"_a, nb::keep_alive<1, 2>())
       .def(
           "run",
-          [](WithDriver& self, nb::handle times) {
-            o80::Replay& replay = self.open();
-            const auto rows = numbers_in<std::int64_t>(times);
-            return without_gil([&] { return replay.run(rows); });
+          [](WithDriver& self, std::span<const std::int64_t> times) {
+            return self.open().run(times);
           },
-          "times"_a, nb::sig("def run(self, times: numpy.typing.NDArray[numpy.int64]) -> bool"))
+          "times"_a, nb::call_guard<Waiting>())
       .def(
           "begin_at_rest",
-          [](WithDriver& self, std::int64_t first, const nb::bytes& before, std::uint32_t slot) {
-            self.open().begin_at_rest(first, span_of(before), slot);
-          },
+          [](WithDriver& self, std::int64_t first, std::span<const std::byte> before,
+             std::uint32_t slot) { self.open().begin_at_rest(first, before, slot); },
           "first"_a, "before"_a, "slot"_a)
       .def(
           "load_snapshot",
-          [](WithDriver& self, std::uint32_t slot, const nb::bytes& bytes) {
-            self.open().load_snapshot(slot, span_of(bytes));
+          [](WithDriver& self, std::uint32_t slot, std::span<const std::byte> bytes) {
+            self.open().load_snapshot(slot, bytes);
           },
           "slot"_a, "state"_a);
   WithoutDriver::bind(m, "DriverlessReplay",
@@ -77,10 +73,8 @@ void bind_replay(nb::module_& m) {
           [](WithoutDriver& self, std::int64_t row) { self.open().begin_at_rest(row); }, "row"_a)
       .def(
           "run",
-          [](WithoutDriver& self, nb::handle rows) {
-            o80::DriverlessReplay& replay = self.open();
-            const Bytes bytes(rows);
-            return without_gil([&] { return replay.run(bytes.span()); });
+          [](WithoutDriver& self, std::span<const std::byte> rows) {
+            return self.open().run(rows);
           },
-          "rows"_a, nb::sig("def run(self, rows: bytes) -> bool"));
+          "rows"_a, nb::call_guard<Waiting>());
 }
