@@ -47,10 +47,10 @@ std::string shown_text(nb::handle value, const char* otherwise) noexcept {
   return otherwise;
 }
 
-double number_of(nb::handle value, const char* name) {
+double number_of(nb::handle value, const char* name, const char* needed) {
   const double number = PyFloat_AsDouble(value.ptr());
   if ((number == -1.0 && PyErr_Occurred() != nullptr) || std::isnan(number)) {
-    refuse(name, "a number", value);
+    refuse(name, needed, value);
   }
   return number;
 }
@@ -81,10 +81,8 @@ std::chrono::nanoseconds nanoseconds_of(nb::handle value, const char* name) {
 o80::Timeout timeout_of(nb::handle seconds) {
   constexpr double kLongest = 1e9;  // [s]
   if (seconds.is_none()) return {};
-  const double number = PyFloat_AsDouble(seconds.ptr());
-  if ((number == -1.0 && PyErr_Occurred() != nullptr) || std::isnan(number)) {
-    refuse("timeout", "a number of seconds, or None for no timeout", seconds);
-  }
+  const double number =
+      number_of(seconds, "timeout", "a number of seconds, or None for no timeout");
   if (number > kLongest) return {};
   return std::chrono::nanoseconds(std::llround(std::fmax(number, 0.0) * 1e9));
 }

@@ -19,7 +19,7 @@ std::string string_of(nb::handle value, const char* name);
 /// str() of any object, made printable, or `otherwise`; for texts that are only shown. Bytes that
 /// Python could not decode (surrogateescape) are read as UTF-8, other surrogates are escaped.
 std::string shown_text(nb::handle value, const char* otherwise = "(no text)") noexcept;
-double number_of(nb::handle value, const char* name);
+double number_of(nb::handle value, const char* name, const char* needed = "a number");
 std::int64_t count_of(nb::handle value, const char* name);
 
 /// [s] => [ns]

@@ -42,6 +42,15 @@ Observation next_row(const std::shared_ptr<UntypedFrontend>& frontend,
   return observation;
 }
 
+/// The next row of a frontend from `next` on. Another thread may have read a row or attached again
+/// meanwhile.
+Observation next_row_of(Frontend& self, const std::shared_ptr<UntypedFrontend>& core,
+                        Iteration next, o80::Timeout timeout) {
+  Observation observation = next_row(core, self.decoder(), next, timeout);
+  if (core == self.shared()) self.next = std::max(self.next, next);
+  return observation;
+}
+
 /// The row that wait_for_next returns next.
 Iteration next_of(Frontend& self) {
   if (self.next < 0) self.next = self.untyped().published() + 1;
@@ -49,12 +58,7 @@ Iteration next_of(Frontend& self) {
 }
 
 Observation wait_for_next(Frontend& self, Patience timeout) {
-  const auto frontend = self.shared();
-  Iteration next = next_of(self);
-  Observation observation = next_row(frontend, self.decoder(), next, timeout);
-  // another thread may have read a row or attached again meanwhile
-  if (frontend == self.shared()) self.next = std::max(self.next, next);
-  return observation;
+  return next_row_of(self, self.shared(), next_of(self), timeout);
 }
 
 /// Waits until a row is published; it may be overwritten since.
@@ -85,10 +89,7 @@ std::vector<std::pair<Frontend*, Observation>> wait_for_first(
   for (const std::size_t i : there) {
     Frontend& frontend = *wanted[i].first;
     if (wanted[i].second.is_none()) {
-      Iteration next = wishes[i].row;
-      rows.emplace_back(&frontend, next_row(alive[i], frontend.decoder(), next, {}));
-      // another thread may have attached again
-      if (alive[i] == frontend.shared()) frontend.next = std::max(frontend.next, next);
+      rows.emplace_back(&frontend, next_row_of(frontend, alive[i], wishes[i].row, {}));
     } else {
       Observation observation = frontend.blank();
       alive[i]->wait_for(wishes[i].row, observation.row.bytes(), std::chrono::nanoseconds(0));
