@@ -152,13 +152,6 @@ Targets Frontend::targets_of(nb::handle named, nb::handle given) const {
   return {std::move(chosen), std::move(states), std::move(masks)};
 }
 
-std::vector<std::byte> Frontend::request_bytes(std::uint32_t index, nb::handle fields) const {
-  const o80::Schema& schema = decoder_->description->schema;
-  const o80::RequestRow& row = schema.requests[index];
-  const std::string owner = "request '" + row.name.str() + "'";
-  return StateBytes(schema, row.type, fields, owner, Missing::by_default).bytes;
-}
-
 void Frontend::close() {
   const std::shared_ptr<UntypedFrontend> frontend = untyped_;
   const std::shared_ptr<o80::InlineRobot> robot = std::move(robot_);

@@ -56,7 +56,6 @@ class Frontend {
   void clip(nb::handle clip, Targets& targets, std::uint32_t rows = 1) const;
   /// Counts what was clipped of targets that were added.
   void note_clipped(const Targets& targets) const;
-  std::vector<std::byte> request_bytes(std::uint32_t index, nb::handle fields) const;
   Observation blank() const { return Observation(decoder_); }
   /// Calls `work` with the core's frontend, without the GIL.
   template <class Work>

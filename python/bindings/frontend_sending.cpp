@@ -17,6 +17,7 @@
 #include "enums.hpp"
 #include "frontend.hpp"
 #include "runtime/frontend/link.hpp"
+#include "states.hpp"
 #include "verb.hpp"
 #include "waiting.hpp"
 
@@ -193,12 +194,12 @@ std::vector<Observation> wait_for_bursts(const std::vector<PendingBurst>& pendin
   return observations;
 }
 
-/// Sends a batch of one record at once.
-template <class Fill>
-Batch send_alone(const Frontend& self, Fill&& fill, const std::optional<o80::Seen>& seen = {}) {
+/// Sends a batch of one record at once. `add`: the method of BatchBuilder for it.
+template <auto add, class... Arguments>
+Batch send_alone(const Frontend& self, const Arguments&... arguments) {
   o80::BatchBuilder batch;
-  fill(batch);
-  return self.released([&](UntypedFrontend& frontend) { return frontend.pulse(batch, seen); });
+  (batch.*add)(arguments...);
+  return self.released([&](UntypedFrontend& frontend) { return frontend.pulse(batch); });
 }
 
 /// Sends a chunk. `due`: for each row an uint32, iterations after the anchor.
@@ -215,11 +216,12 @@ Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuato
                                   .reject_late = reject_late,
                                   .final = final,
                                   .profile = profile_of_rows(profile)};
-  const auto fill = [&](o80::BatchBuilder& batch) {
-    self.untyped().add_chunk(batch, actuators, due, states, options, masks);
-    batch.note_clipped(clipped);
-  };
-  const Batch sent = send_alone(self, fill, seen_of(seen));
+  const std::optional<o80::Seen> decided = seen_of(seen);
+  o80::BatchBuilder batch;
+  self.untyped().add_chunk(batch, actuators, due, states, options, masks);
+  batch.note_clipped(clipped);
+  const Batch sent =
+      self.released([&](UntypedFrontend& frontend) { return frontend.pulse(batch, decided); });
   self.clipped += static_cast<std::int64_t>(clipped);
   return sent;
 }
@@ -302,7 +304,7 @@ Batch send_request(const Frontend& self, nb::handle name, nb::handle fields, nb:
   const std::optional<o80::Seen> decided = seen_of(seen);
   const auto frontend = self.shared();
   const std::uint32_t index = frontend->request_index(string_of(name, "the name of a request"));
-  const std::vector<std::byte> payload = self.request_bytes(index, fields);
+  const auto payload = request_bytes(frontend->schema(), index, fields);
   frontend->command_check().request(index, payload);
   o80::BatchBuilder batch;
   batch.request(static_cast<std::uint16_t>(index), payload);
@@ -318,7 +320,7 @@ void wait_until_ended(const Frontend& self, const Batch& batch, Patience timeout
 std::uint32_t add_request(const Frontend& self, nb::handle name, const nb::kwargs& fields) {
   const auto frontend = self.shared();
   const std::uint32_t index = frontend->request_index(string_of(name, "the name of a request"));
-  return frontend->add_request(index, self.request_bytes(index, fields));
+  return frontend->add_request(index, request_bytes(frontend->schema(), index, fields));
 }
 
 }  // namespace
@@ -353,8 +355,7 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
   def_verb(
       frontend, verbs::purge,
       [](const Frontend& self, nb::handle actuator) {
-        const std::uint16_t which = purged(self, actuator);
-        return send_alone(self, [&](o80::BatchBuilder& batch) { batch.purge(which); });
+        return send_alone<&o80::BatchBuilder::purge>(self, purged(self, actuator));
       },
       all);
   def_verb(
@@ -364,7 +365,7 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
         if (o80::printable(line) != line) {
           refuse("the text of a mark", "one line of printable text", text);
         }
-        return send_alone(self, [&](o80::BatchBuilder& batch) { batch.mark(line); });
+        return send_alone<&o80::BatchBuilder::mark>(self, line);
       },
       "text"_a.none());
   def_noun(frontend, verbs::added, &of_core<&UntypedFrontend::added>);
@@ -389,12 +390,7 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
       .def("_send_chunk", &send_chunk, "actuators"_a, "due"_a, "states"_a, "masks"_a, "anchor"_a,
            "plan"_a, "ease"_a, "first"_a, "fixed"_a, "reject_late"_a, "final"_a, "profile"_a,
            "seen"_a.none(), "clipped"_a)
-      .def(
-          "_close_plan",
-          [](const Frontend& self, std::uint64_t plan) {
-            send_alone(self, [&](o80::BatchBuilder& batch) { batch.close_plan(plan); });
-          },
-          "plan"_a)
+      .def("_close_plan", &send_alone<&o80::BatchBuilder::close_plan, std::uint64_t>, "plan"_a)
       .def(
           "_since",
           [](const Frontend& self, nb::handle seen) {
@@ -403,17 +399,10 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
           "seen"_a)
       .def("_purge_own",
            [](const Frontend& self) {
-             return send_alone(
-                 self, [](o80::BatchBuilder& batch) { batch.purge_own(o80::kEveryActuator); });
+             return send_alone<&o80::BatchBuilder::purge_own>(self, o80::kEveryActuator);
            })
-      .def("_take_control",
-           [](const Frontend& self) {
-             return send_alone(self, [](o80::BatchBuilder& batch) { batch.take_control(); });
-           })
-      .def("_release_control",
-           [](const Frontend& self) {
-             return send_alone(self, [](o80::BatchBuilder& batch) { batch.release_control(); });
-           })
+      .def("_take_control", &send_alone<&o80::BatchBuilder::take_control>)
+      .def("_release_control", &send_alone<&o80::BatchBuilder::release_control>)
       .def("_preview", &preview, "actuators"_a.none(), "target"_a.none(), "initial"_a.none(),
            "options"_a)
       .def(

@@ -111,13 +111,10 @@ class Group {
   }
   /// The bytes of requests with these fields, one after the other. `each`: a mapping for each.
   nb::bytes payloads(std::uint32_t request, const std::vector<nb::object>& each) const {
-    const o80::Schema& schema = group_->description().schema;
-    const o80::RequestRow& row = schema.requests[request];
-    const std::string what = "request '" + row.name.str() + "'";
     std::vector<std::byte> all;
     for (const nb::object& fields : each) {
-      const StateBytes payload(schema, row.type, fields, what, Missing::by_default);
-      all.insert(all.end(), payload.bytes.begin(), payload.bytes.end());
+      const auto payload = request_bytes(group_->description().schema, request, fields);
+      all.insert(all.end(), payload.begin(), payload.end());
     }
     return bytes_of(all);
   }

@@ -302,3 +302,10 @@ StateBytes::StateBytes(const Schema& schema, std::uint32_t type, nb::handle valu
     : bytes(schema.types[type].size), mask(o80::mask_words(schema.scalar_count(type))) {
   Writer(schema, *this, missing).write(type, value, bytes.data(), 0, owner);
 }
+
+std::vector<std::byte> request_bytes(const Schema& schema, std::uint32_t request,
+                                     nb::handle fields) {
+  const o80::RequestRow& row = schema.requests[request];
+  const std::string owner = "request '" + row.name.str() + "'";
+  return StateBytes(schema, row.type, fields, owner, Missing::by_default).bytes;
+}
