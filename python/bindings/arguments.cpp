@@ -47,10 +47,10 @@ std::string shown_text(nb::handle value, const char* otherwise) noexcept {
   return otherwise;
 }
 
-double number_of(nb::handle value, const char* name) {
+double number_of(nb::handle value, const char* name, const char* needed) {
   const double number = PyFloat_AsDouble(value.ptr());
   if ((number == -1.0 && PyErr_Occurred() != nullptr) || std::isnan(number)) {
-    refuse(name, "a number", value);
+    refuse(name, needed, value);
   }
   return number;
 }
@@ -81,10 +81,8 @@ std::chrono::nanoseconds nanoseconds_of(nb::handle value, const char* name) {
 o80::Timeout timeout_of(nb::handle seconds) {
   constexpr double kLongest = 1e9;  // [s]
   if (seconds.is_none()) return {};
-  const double number = PyFloat_AsDouble(seconds.ptr());
-  if ((number == -1.0 && PyErr_Occurred() != nullptr) || std::isnan(number)) {
-    refuse("timeout", "a number of seconds, or None for no timeout", seconds);
-  }
+  const double number =
+      number_of(seconds, "timeout", "a number of seconds, or None for no timeout");
   if (number > kLongest) return {};
   return std::chrono::nanoseconds(std::llround(std::fmax(number, 0.0) * 1e9));
 }
@@ -145,24 +143,16 @@ o80::CommandOptions command_options(nb::handle duration, nb::handle speed, nb::h
   return options;
 }
 
-bool names_several(nb::handle actuators) {
-  return actuators.is_none() ||
-         (PySequence_Check(actuators.ptr()) != 0 && PyUnicode_Check(actuators.ptr()) == 0);
+bool is_sequence(nb::handle value) {
+  return PySequence_Check(value.ptr()) != 0 && PyUnicode_Check(value.ptr()) == 0;
 }
 
-namespace {
-
-o80::PulseOptions::Late late_of(nb::handle word) {
-  const nb::str text(word);
-  const auto is = [&](const char* known) {
-    return PyUnicode_CompareWithASCIIString(text.ptr(), known) == 0;
-  };
-  if (is("reject")) return o80::PulseOptions::Late::reject;
-  if (is("now")) return o80::PulseOptions::Late::now;
-  throw InvalidArgument("late must be 'reject' or 'now', got '" + std::string(text.c_str()) + "'");
+bool is_sequence_of(nb::handle value, std::size_t length) {
+  if (!is_sequence(value)) return false;
+  const Py_ssize_t found = PySequence_Size(value.ptr());
+  if (found < 0) PyErr_Clear();  // an array without axes
+  return found == static_cast<Py_ssize_t>(length);
 }
-
-}  // namespace
 
 std::optional<o80::Seen> seen_of(nb::handle seen) {
   if (seen.is_none()) return {};
@@ -189,7 +179,8 @@ o80::PulseOptions pulse_options(nb::handle at, nb::handle late, nb::handle seen)
       throw InvalidArgument("at must be at least iteration 0, got " + std::to_string(options.at));
     }
   }
-  options.late = late_of(late);
+  constexpr std::string_view kWords[] = {"reject", "now"};
+  options.late = static_cast<o80::PulseOptions::Late>(place_of(late, kWords, "late"));
   options.seen = seen_of(seen);
   return options;
 }

@@ -19,7 +19,7 @@ std::string string_of(nb::handle value, const char* name);
 /// str() of any object, made printable, or `otherwise`; for texts that are only shown. Bytes that
 /// Python could not decode (surrogateescape) are read as UTF-8, other surrogates are escaped.
 std::string shown_text(nb::handle value, const char* otherwise = "(no text)") noexcept;
-double number_of(nb::handle value, const char* name);
+double number_of(nb::handle value, const char* name, const char* needed = "a number");
 std::int64_t count_of(nb::handle value, const char* name);
 
 /// [s] => [ns]
@@ -31,8 +31,9 @@ o80::CommandOptions command_options(nb::handle duration, nb::handle speed, nb::h
                                     nb::handle iterations, nb::handle fastest, nb::handle mode,
                                     nb::handle profile, nb::handle start, nb::handle every,
                                     std::int64_t period, bool of_rows = false);
-/// True for a list of actuators, or None (all); false for one index or name.
-bool names_several(nb::handle actuators);
+/// True for a list, a tuple or an array; false for a text.
+bool is_sequence(nb::handle value);
+bool is_sequence_of(nb::handle value, std::size_t length);
 
 /// The row by which a batch was decided: an o80.Observation, an o80.Seen, or None.
 std::optional<o80::Seen> seen_of(nb::handle seen);

@@ -16,7 +16,6 @@
 #include "loop_options.hpp"
 #include "memory/os/fork.hpp"
 #include "o80/runtime/observation.hpp"
-#include "pickling.hpp"
 #include "schema_builder.hpp"
 #include "waiting.hpp"
 
@@ -43,8 +42,8 @@ class Backend final : public o80::RequestServer {
   const nb::bytearray& observed() const { return observed_; }
   const nb::bytearray& extended() const { return extended_; }
   const nb::bytearray& fresh_desired() const { return fresh_desired_; }
-  /// Called with index and payload of a request; returns None (done), a text (rejected), a text in
-  /// a tuple (running), or True (start afresh).
+  /// Called with index and payload of a request; returns a number of o80::Served and a text. So do
+  /// its methods `halt` and `resume`.
   nb::object serve_with = nb::none();
 
   /// Throws Closed or UsedAfterFork.
@@ -84,8 +83,7 @@ class Backend final : public o80::RequestServer {
   }
 
   /// True if an iteration has begun, false if the backend must end.
-  bool step(nb::handle seconds) {
-    const o80::Timeout timeout = timeout_of(seconds);
+  bool step(Patience timeout) {
     between_steps();
     if (!begun_) throw InvalidArgument("publish row 0 before the first step");
     const Stepping stepping(*this);
@@ -116,6 +114,7 @@ class Backend final : public o80::RequestServer {
     checked().halt(o80::HaltCause::driver, shown_text(text, ""));
   }
 
+  bool closed() const { return !backend_; }
   /// The reason why `step` returned false without a stop; empty if there is none.
   std::string failure() const {
     return backend_ && !guard_.forked() ? std::string(backend_->failure()) : "";
@@ -218,11 +217,10 @@ class Backend final : public o80::RequestServer {
   o80::Served answered(Call&& call) noexcept {
     const WithGil locked;
     try {
-      const nb::object answer = call_python(call);
-      if (answer.is_none()) return o80::Served::done();
-      if (nb::isinstance<nb::str>(answer)) return o80::Served::rejected(shown_text(answer));
-      if (nb::isinstance<nb::tuple>(answer)) return o80::Served::running(shown_text(answer[0]));
-      return o80::Served::start_afresh();
+      const auto [kind, text] = nb::cast<std::pair<std::uint8_t, nb::object>>(call_python(call));
+      o80::Served answer = o80::Served::running(shown_text(text));
+      answer.kind = static_cast<o80::Served::Kind>(kind);
+      return answer;
     } catch (nb::python_error& error) {
       raised_ = std::current_exception();
       const std::string type = shown_text(error.type().attr("__name__"));
@@ -289,7 +287,6 @@ void bind_backend(nb::module_& m) {
 
   nb::class_<Backend> bound(m, "Backend", nb::type_slots(backend_slots),
                             "The compiled half of o80.Backend.");
-  refuse_to_pickle(bound, "a backend", "its segment's name, and open o80.Frontend(name) there");
   bound.def(nb::new_(&make), "builder"_a, "segment"_a, "loop"_a)
       .def_rw("serve_with", &Backend::serve_with, nb::arg().none())
       .def_prop_ro("description",
@@ -322,6 +319,7 @@ void bind_backend(nb::module_& m) {
       .def("ask_to_stop", [](const Backend& self) { self.checked().ask_to_stop(); })
       .def("end", &Backend::end, "failed"_a, "text"_a)
       .def_prop_ro("failure", &Backend::failure)
+      .def_prop_ro("closed", &Backend::closed)
       .def_prop_ro("iteration", [](const Backend& self) { return self.checked().iteration(); })
       .def_prop_ro("time", [](const Backend& self) { return self.checked().time(); });
 }

@@ -75,20 +75,19 @@ std::string text_of_seen(const o80::Seen& seen) {
          std::to_string(seen.epoch) + ">";
 }
 
+constexpr std::string_view kClocks[] = {"monotonic", "simulated"};  // in their order
+
 o80::Seen seen_from(std::uint64_t epoch, o80::Iteration iteration, std::int64_t time,
-                    const std::string& clock, o80::Iteration since) {
-  if (clock != "monotonic" && clock != "simulated") {
-    throw o80::InvalidArgument("clock must be 'monotonic' or 'simulated', got '" + clock + "'");
-  }
-  return {epoch, iteration, time,
-          clock == "simulated" ? o80::Clock::simulated : o80::Clock::monotonic, since};
+                    nb::handle clock, o80::Iteration since) {
+  const auto known = static_cast<o80::Clock>(place_of(clock, kClocks, "clock"));
+  return {epoch, iteration, time, known, since};
 }
 
 void bind_seen(nb::module_& m) {
   using o80::DecisionLatency;
   using o80::Seen;
   const auto clock_of = [](const Seen& self) {
-    return self.clock == o80::Clock::simulated ? "simulated" : "monotonic";
+    return kClocks[static_cast<std::size_t>(self.clock)];
   };
   nb::class_<Seen>(m, "Seen", "The row by which a batch was decided, of any segment.")
       .def(nb::new_(&seen_from), "epoch"_a, "iteration"_a, "time"_a, "clock"_a, "since"_a = -1)
@@ -216,10 +215,9 @@ None if it was pulsed without `seen`, was rejected, or if that row is not publis
 from the history, so ask while that holds the row.)")
       .def(
           "wait",
-          [](const Batch& self, nb::handle timeout, nb::handle check) {
-            const o80::Timeout patience = timeout_of(timeout);
+          [](const Batch& self, Patience timeout, nb::handle check) {
             const o80::WaitOptions options{.check = truth_of(check, "check")};
-            carrying(self, [&] { self.wait(patience, Waiting::keep_waiting, options); });
+            carrying(self, [&] { self.wait(timeout, Waiting::keep_waiting, options); });
           },
           "timeout"_a = nb::none(), nb::kw_only(), "check"_a.none() = true,
           nb::sig("def wait(self, timeout: float | None = None, *, check: bool = True) -> None"),
@@ -259,10 +257,9 @@ A burst that has not begun runs no iteration. Commands sent with it stay queued.
 the last row that it published.)")
       .def(
           "wait",
-          [](const PendingBurst& self, nb::handle timeout) {
-            const o80::Timeout patience = timeout_of(timeout);
+          [](const PendingBurst& self, Patience timeout) {
             return Observation(self.decoder, carrying(self.burst.batch(), [&] {
-                                 return self.burst.wait(patience, Waiting::keep_waiting);
+                                 return self.burst.wait(timeout, Waiting::keep_waiting);
                                }));
           },
           "timeout"_a = nb::none(),

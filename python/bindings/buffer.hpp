@@ -1,23 +1,22 @@
 #pragma once
 
+#include <nanobind/nanobind.h>
+
 #include <cstddef>
 #include <cstring>
 #include <span>
+#include <type_traits>
 #include <vector>
-
-#include "nb.hpp"
 
 /// The memory of a Python object.
 struct Bytes {
-  explicit Bytes(nb::handle owner, int flags = PyBUF_SIMPLE) {
-    if (PyObject_GetBuffer(owner.ptr(), &view, flags) != 0) throw nb::python_error();
+  explicit Bytes(nanobind::handle owner, int flags = PyBUF_SIMPLE) {
+    if (PyObject_GetBuffer(owner.ptr(), &view, flags) != 0) throw nanobind::python_error();
   }
   Bytes(const Bytes&) = delete;
   Bytes& operator=(const Bytes&) = delete;
   ~Bytes() { PyBuffer_Release(&view); }
-  std::span<const std::byte> span() const {
-    return {static_cast<const std::byte*>(view.buf), static_cast<std::size_t>(view.len)};
-  }
+  std::span<const std::byte> span() const { return writable(); }
   /// Only for a buffer requested with PyBUF_WRITABLE.
   std::span<std::byte> writable() const {
     return {static_cast<std::byte*>(view.buf), static_cast<std::size_t>(view.len)};
@@ -25,21 +24,35 @@ struct Bytes {
   Py_buffer view{};
 };
 
-/// The numbers in the memory of a Python object.
+/// An argument std::span: the memory of a Python object until the call returns. Without `const` the
+/// function writes to it.
 template <class T>
-std::vector<T> numbers_in(nb::handle owner) {
-  const Bytes bytes(owner);
-  std::vector<T> numbers(bytes.span().size() / sizeof(T));
-  if (!numbers.empty())
-    std::memcpy(numbers.data(), bytes.span().data(), numbers.size() * sizeof(T));
-  return numbers;
-}
+struct nanobind::detail::type_caster<std::span<T>> {
+  template <class>
+  using Cast = std::span<T>;
+  static constexpr auto Name = const_name("bytes | bytearray | numpy.typing.NDArray[typing.Any]");
 
-inline std::span<const std::byte> span_of(const nb::bytes& bytes) {
-  return std::as_bytes(std::span(bytes.c_str(), bytes.size()));
-}
+  type_caster() = default;
+  type_caster(const type_caster&) = delete;
+  type_caster& operator=(const type_caster&) = delete;
+  ~type_caster() { PyBuffer_Release(&view); }
+  template <class>
+  static constexpr bool can_cast() {
+    return true;
+  }
+  bool from_python(handle owner, std::uint32_t, cleanup_list*) noexcept {
+    constexpr int kFlags = std::is_const_v<T> ? PyBUF_SIMPLE : PyBUF_WRITABLE;
+    const bool has_memory = PyObject_GetBuffer(owner.ptr(), &view, kFlags) == 0;
+    if (!has_memory) PyErr_Clear();
+    return has_memory;
+  }
+  explicit operator std::span<T>() const {
+    return {static_cast<T*>(view.buf), static_cast<std::size_t>(view.len) / sizeof(T)};
+  }
+  Py_buffer view{};
+};
 
 template <class T>
-nb::bytes bytes_of(const std::vector<T>& values) {
-  return nb::bytes(values.data(), values.size() * sizeof(T));
+nanobind::bytes bytes_of(const std::vector<T>& values) {
+  return nanobind::bytes(values.data(), values.size() * sizeof(T));
 }

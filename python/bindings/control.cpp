@@ -20,8 +20,8 @@ namespace {
 /// Python, so control is given back by the destructor too.
 class Control {
  public:
-  Control(nb::object frontend, nb::handle timeout)
-      : frontend_(std::move(frontend)), timeout_(timeout_of(timeout)) {
+  Control(nb::object frontend, Patience timeout)
+      : frontend_(std::move(frontend)), timeout_(timeout) {
     nb::cast<Frontend&>(frontend_).shared()->link()->check_usable();
   }
   Control(const Control&) = delete;
@@ -107,7 +107,7 @@ void bind_control(nb::module_& m) {
                               "Exclusive control within a `with` block.");
   refuse_to_pickle(control, "exclusive control", "nothing, and take control there");
   control
-      .def(nb::init<nb::object, nb::handle>(), "frontend"_a, "timeout"_a.none(),
+      .def(nb::init<nb::object, Patience>(), "frontend"_a, "timeout"_a.none(),
            nb::sig("def __init__(self, frontend: Frontend, timeout: float | None) -> None"))
       .def("__enter__", &Control::enter, nb::sig("def __enter__(self) -> Frontend"))
       .def(

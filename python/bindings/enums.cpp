@@ -1,29 +1,38 @@
 #include "enums.hpp"
 
+#include <algorithm>
 #include <array>
-
 #include <string>
 
 #include "arguments.hpp"
 #include "o80/base/error.hpp"
 
-namespace {
-
-/// The value whose text is `word`; the error lists all values.
-template <class Value, std::size_t N>
-Value parse(nb::handle word, const std::array<Value, N>& values, const char* name) {
+std::size_t place_of(nb::handle word, std::span<const std::string_view> known, const char* name) {
   Py_ssize_t size = 0;
   const char* text =
       PyUnicode_Check(word.ptr()) ? PyUnicode_AsUTF8AndSize(word.ptr(), &size) : nullptr;
-  std::string there;
-  for (const Value value : values) {
-    const std::string_view known = o80::to_text(value);
-    if (text != nullptr && known == std::string_view(text, static_cast<std::size_t>(size))) {
-      return value;
-    }
-    there += (there.empty() ? "'" : ", '") + std::string(known) + "'";
+  if (text != nullptr) {
+    const std::string_view given(text, static_cast<std::size_t>(size));
+    const auto found = std::ranges::find(known, given);
+    if (found != known.end()) return static_cast<std::size_t>(found - known.begin());
   }
-  refuse(name, "one of " + there, word);
+  const bool is_pair = known.size() == 2;
+  std::string there;
+  for (const std::string_view one : known) {
+    if (!there.empty()) there += is_pair ? " or " : ", ";
+    there += "'" + std::string(one) + "'";
+  }
+  refuse(name, (is_pair ? "" : "one of ") + there, word);
+}
+
+namespace {
+
+/// The value whose text is `word`.
+template <class Value, std::size_t N>
+Value parse(nb::handle word, const std::array<Value, N>& values, const char* name) {
+  std::array<std::string_view, N> words;
+  std::ranges::transform(values, words.begin(), [](Value value) { return o80::to_text(value); });
+  return values[place_of(word, words, name)];
 }
 
 /// The member of a Python enumeration, looked up once and kept until the process ends.

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstring>
-#include <vector>
 
 #include "arguments.hpp"
 #include "bindings.hpp"
@@ -14,18 +13,6 @@
 
 using o80::InvalidArgument;
 using o80::UntypedFrontend;
-
-namespace {
-
-/// Length of a list, tuple or array of targets; -1 for other types.
-Py_ssize_t length_of(nb::handle targets) {
-  if (PySequence_Check(targets.ptr()) == 0 || PyUnicode_Check(targets.ptr()) != 0) return -1;
-  const Py_ssize_t length = PyObject_Size(targets.ptr());
-  if (length < 0) PyErr_Clear();
-  return length;
-}
-
-}  // namespace
 
 Frontend::Frontend(const Attachment& attachment, std::shared_ptr<Decoder> decoder)
     : untyped_(attachment.frontend), robot_(attachment.robot), decoder_(std::move(decoder)) {
@@ -48,6 +35,10 @@ nb::object Frontend::expanded(nb::handle named) const {
   if (!PyUnicode_Check(named.ptr())) return nb::borrow(named);
   PyObject* found = PyDict_GetItemWithError(groups_.ptr(), named.ptr());
   return nb::borrow(found != nullptr ? nb::handle(found) : named);
+}
+
+bool Frontend::names_one(nb::handle named) const {
+  return !named.is_none() && !is_sequence(expanded(named));
 }
 
 std::uint32_t Frontend::actuator(nb::handle named) const {
@@ -94,17 +85,17 @@ std::uint32_t Frontend::add_command(nb::handle named, nb::handle target,
 
 std::vector<std::uint32_t> Frontend::actuators(nb::handle named) const {
   std::vector<std::uint32_t> indices;
+  const auto add = [&](nb::handle one) {
+    const nb::object group = expanded(one);
+    if (group.is(one)) return indices.push_back(actuator(one));
+    for (const nb::handle each : group) indices.push_back(actuator(each));
+  };
   if (named.is_none()) {
     for (std::uint32_t i = 0; i < plain_.size(); ++i) indices.push_back(i);
+  } else if (is_sequence(named)) {
+    for (const nb::handle one : named) add(one);
   } else {
-    for (const nb::handle one : named) {
-      const nb::object several = expanded(one);
-      if (!names_several(several)) {
-        indices.push_back(actuator(one));
-        continue;
-      }
-      for (const nb::handle each : several) indices.push_back(actuator(each));
-    }
+    add(named);
   }
   return indices;
 }
@@ -131,16 +122,11 @@ void Frontend::note_clipped(const Targets& targets) const {
   untyped_->note_clipped(targets.clipped);
 }
 
-Targets Frontend::targets_of(nb::handle named, nb::handle targets) const {
-  if (!names_several(expanded(named)))
-    return of_each(nb::make_tuple(named), nb::make_tuple(targets));
-  return of_each(expanded(named), targets);
-}
-
-Targets Frontend::of_each(nb::handle named, nb::handle targets) const {
+Targets Frontend::targets_of(nb::handle named, nb::handle given) const {
   std::vector<std::uint32_t> chosen = actuators(named);
+  const nb::object targets = names_one(named) ? nb::make_tuple(given) : nb::borrow(given);
   const o80::Schema& schema = decoder_->description->schema;
-  if (length_of(targets) != static_cast<Py_ssize_t>(chosen.size())) {
+  if (!is_sequence_of(targets, chosen.size())) {
     throw InvalidArgument("a command for " + std::to_string(chosen.size()) +
                           " actuators needs a target for each, in their order, got " +
                           repr_of(targets));
@@ -166,13 +152,6 @@ Targets Frontend::of_each(nb::handle named, nb::handle targets) const {
   return {std::move(chosen), std::move(states), std::move(masks)};
 }
 
-std::vector<std::byte> Frontend::request_bytes(std::uint32_t index, nb::handle fields) const {
-  const o80::Schema& schema = decoder_->description->schema;
-  const o80::RequestRow& row = schema.requests[index];
-  const std::string owner = "request '" + row.name.str() + "'";
-  return StateBytes(schema, row.type, fields, owner, Missing::by_default).bytes;
-}
-
 void Frontend::close() {
   const std::shared_ptr<UntypedFrontend> frontend = untyped_;
   const std::shared_ptr<o80::InlineRobot> robot = std::move(robot_);
@@ -195,10 +174,10 @@ std::string Frontend::name_of(std::uint32_t index) const {
 
 namespace {
 
-Attachment attach(const std::string& segment, nb::handle timeout, bool read_only, bool dead,
-                  const o80::KeepWaiting& keep_waiting = Waiting::keep_waiting) {
+Attachment attach(const std::string& segment, Patience timeout, bool read_only, bool dead,
+                  const o80::KeepWaiting& keep_waiting) {
   const o80::FrontendOptions options{
-      .timeout = timeout_of(timeout),
+      .timeout = timeout,
       .access = read_only ? o80::Access::read_only : o80::Access::read_write,
       .dead = dead,
       .keep_waiting = keep_waiting};
@@ -207,7 +186,7 @@ Attachment attach(const std::string& segment, nb::handle timeout, bool read_only
 }
 
 /// Successor that takes the place of a frontend; its closing ends the wait.
-Attachment attach_again(const Frontend& self, nb::handle timeout, bool read_only) {
+Attachment attach_again(const Frontend& self, Patience timeout, bool read_only) {
   const std::shared_ptr<UntypedFrontend> former = self.shared();
   former->link()->check_usable();
   const o80::KeepWaiting keep_waiting = Waiting::keep_waiting;
@@ -215,21 +194,18 @@ Attachment attach_again(const Frontend& self, nb::handle timeout, bool read_only
                 former->link()->guarded(keep_waiting));
 }
 
-std::shared_ptr<o80::Description> description_of(const Attachment& attachment) {
-  return std::make_shared<o80::Description>(*attachment.frontend->description());
-}
-
 }  // namespace
 
 void bind_frontend(nb::module_& m) {
   nb::class_<Attachment>(m, "Attachment", "A frontend that has no class yet.")
-      .def_prop_ro("description", &description_of)
+      .def_prop_ro("description",
+                   [](const Attachment& self) { return self.frontend->description(); })
       .def_prop_ro("robot",
                    [](const Attachment& self) { return self.frontend->schema().head.robot.str(); });
   m.def(
       "attach",
-      [](const std::string& segment, nb::handle timeout, bool read_only, bool dead) {
-        return attach(segment, timeout, read_only, dead);
+      [](const std::string& segment, Patience timeout, bool read_only, bool dead) {
+        return attach(segment, timeout, read_only, dead, Waiting::keep_waiting);
       },
       "segment"_a, "timeout"_a.none(), "read_only"_a, "dead"_a);
   m.def("difference", [](const o80::Description& expected, const o80::Description& found) {
@@ -242,16 +218,12 @@ void bind_frontend(nb::module_& m) {
   bind_moving(m, frontend);
   bind_reading(m, frontend);
   bind_halting(m, frontend);
-  def_noun(frontend, "segment", verbs::segment,
-           [](const Frontend& self) { return self.untyped().segment(); });
-  def_noun(frontend, "epoch", verbs::epoch,
-           [](const Frontend& self) { return self.untyped().epoch(); });
-  def_noun(frontend, "bursting", verbs::bursting,
-           [](const Frontend& self) { return self.untyped().bursting(); });
-  def_noun(frontend, "life", verbs::life,
+  def_noun(frontend, verbs::segment, &of_core<&UntypedFrontend::segment>);
+  def_noun(frontend, verbs::epoch, &of_core<&UntypedFrontend::epoch>);
+  def_noun(frontend, verbs::bursting, &of_core<&UntypedFrontend::bursting>);
+  def_noun(frontend, verbs::closed, &of_core<&UntypedFrontend::closed>);
+  def_noun(frontend, verbs::life,
            [](const Frontend& self) { return std::string(name_of(self.untyped().life())); });
-  def_noun(frontend, "closed", verbs::closed,
-           [](const Frontend& self) { return self.untyped().closed(); });
   frontend.def_prop_ro("_is_inline", &Frontend::is_inline)
       .def("_close", &Frontend::close)
       .def("_check_usable", [](const Frontend& self) { self.untyped().link()->check_usable(); })

@@ -47,14 +47,15 @@ class Frontend {
   std::uint32_t add_command(nb::handle named, nb::handle target,
                             const o80::CommandOptions& options) const;
   /// The targets of one command: for one actuator, a group, a list of actuators, or all (None).
-  Targets targets_of(nb::handle named, nb::handle targets) const;
-  /// The actuators of a group, by its name; what is no name of a group stays what it is.
-  nb::object expanded(nb::handle named) const;
+  Targets targets_of(nb::handle named, nb::handle given) const;
+  /// From an index, a name, also of a group, a sequence of these, or None (all).
+  std::vector<std::uint32_t> actuators(nb::handle named) const;
+  /// True for an index, or a name that is not that of a group.
+  bool names_one(nb::handle named) const;
   /// Puts `rows` targets of each actuator inside their bounds if `clip`.
   void clip(nb::handle clip, Targets& targets, std::uint32_t rows = 1) const;
   /// Counts what was clipped of targets that were added.
   void note_clipped(const Targets& targets) const;
-  std::vector<std::byte> request_bytes(std::uint32_t index, nb::handle fields) const;
   Observation blank() const { return Observation(decoder_); }
   /// Calls `work` with the core's frontend, without the GIL.
   template <class Work>
@@ -76,9 +77,8 @@ class Frontend {
   std::string name_of(std::uint32_t index) const;
   void write(std::uint32_t index, const o80::FieldRow& number, nb::handle target,
              std::byte* to) const;
-  std::vector<std::uint32_t> actuators(nb::handle named) const;
-  /// From a sequence of actuators, or None, and a sequence of targets.
-  Targets of_each(nb::handle named, nb::handle targets) const;
+  /// The actuators of a group, by its name; what is no name of a group stays what it is.
+  nb::object expanded(nb::handle named) const;
 
   std::shared_ptr<o80::UntypedFrontend> untyped_;
   std::shared_ptr<o80::InlineRobot> robot_;

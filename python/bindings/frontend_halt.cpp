@@ -46,10 +46,9 @@ std::uint64_t halt(const Frontend& self, const nb::args& given, const nb::kwargs
   return number;
 }
 
-bool resume(const Frontend& self, std::uint64_t number, nb::handle timeout, bool accept_reading) {
-  const o80::Timeout patience = timeout_of(timeout);
+bool resume(const Frontend& self, std::uint64_t number, Patience timeout, bool accept_reading) {
   return self.released([&](o80::UntypedFrontend& frontend) {
-    return frontend.resume(number, patience, Waiting::keep_waiting, accept_reading);
+    return frontend.resume(number, timeout, Waiting::keep_waiting, accept_reading);
   });
 }
 
@@ -94,9 +93,8 @@ void bind_halting(nb::module_& m, nb::class_<Frontend>& frontend) {
   m.def(
       "printable", [](nb::handle text) { return shown_text(text, ""); }, "text"_a.none(),
       nb::sig("def printable(text: object) -> str"));
-  def_verb(frontend, "halt", verbs::halt, &halt);
-  def_verb(frontend, "keep_alive", verbs::keep_alive,
-           [](const Frontend& self) { self.untyped().keep_alive(); });
+  def_verb(frontend, verbs::halt, &halt);
+  def_verb(frontend, verbs::keep_alive, &of_core<&o80::UntypedFrontend::keep_alive>);
   frontend
       .def_prop_ro("_halted",
                    [](const Frontend& self) { return halt_fields(self.untyped().halted()); })

@@ -53,8 +53,7 @@ void set_tolerances(const o80::Schema& schema, nb::handle given, const Targets& 
     return;
   }
   const bool is_one = is_mapping(given);
-  if (!is_one && (PySequence_Check(given.ptr()) == 0 || PyUnicode_Check(given.ptr()) != 0 ||
-                  nb::len(given) != targets.actuators.size())) {
+  if (!is_one && !is_sequence_of(given, targets.actuators.size())) {
     refuse("tolerance",
            "a number, a mapping from fields to numbers, or one of these for each actuator", given);
   }
@@ -69,8 +68,7 @@ void set_tolerances(const o80::Schema& schema, nb::handle given, const Targets& 
 
 /// `timeout`, of the wait that follows, is refused before anything is sent.
 Move start_move(const Frontend& self, nb::handle actuators, nb::handle targets,
-                nb::handle tolerance, nb::handle timeout, const o80::CommandOptions& command) {
-  timeout_of(timeout);
+                nb::handle tolerance, Patience /*timeout*/, const o80::CommandOptions& command) {
   const auto frontend = self.shared();
   MoveOptions options{.command = command};
   const Targets chosen = self.targets_of(actuators, targets);
@@ -79,12 +77,11 @@ Move start_move(const Frontend& self, nb::handle actuators, nb::handle targets,
   return frontend->start_move(chosen.actuators, chosen.states, options, chosen.masks);
 }
 
-Observation wait_for_move(const Frontend& self, const Move& move, nb::handle timeout) {
-  const o80::Timeout patience = timeout_of(timeout);
+Observation wait_for_move(const Frontend& self, const Move& move, Patience timeout) {
   const auto frontend = self.shared();
   const auto decoder = self.decoder();
   return Observation(decoder, carrying(move.batch(), [&] {
-                       return frontend->wait_for_move(move, patience, Waiting::keep_waiting);
+                       return frontend->wait_for_move(move, timeout, Waiting::keep_waiting);
                      }));
 }
 

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "arguments.hpp"
-#include "buffer.hpp"
 #include "frontend.hpp"
 #include "pickling.hpp"
 #include "runtime/frontend/link.hpp"
@@ -23,12 +22,11 @@ Observation latest(const Frontend& self) {
   return observation;
 }
 
-Observation wait_for(const Frontend& self, nb::handle iteration, nb::handle timeout) {
+Observation wait_for(const Frontend& self, nb::handle iteration, Patience timeout) {
   const Iteration wanted = count_of(iteration, "the iteration to wait for");
-  const o80::Timeout patience = timeout_of(timeout);
   Observation observation = self.blank();
   self.released([&](UntypedFrontend& frontend) {
-    frontend.wait_for(wanted, observation.row.bytes(), patience, Waiting::keep_waiting);
+    frontend.wait_for(wanted, observation.row.bytes(), timeout, Waiting::keep_waiting);
   });
   return observation;
 }
@@ -44,20 +42,23 @@ Observation next_row(const std::shared_ptr<UntypedFrontend>& frontend,
   return observation;
 }
 
+/// The next row of a frontend from `next` on. Another thread may have read a row or attached again
+/// meanwhile.
+Observation next_row_of(Frontend& self, const std::shared_ptr<UntypedFrontend>& core,
+                        Iteration next, o80::Timeout timeout) {
+  Observation observation = next_row(core, self.decoder(), next, timeout);
+  if (core == self.shared()) self.next = std::max(self.next, next);
+  return observation;
+}
+
 /// The row that wait_for_next returns next.
 Iteration next_of(Frontend& self) {
   if (self.next < 0) self.next = self.untyped().published() + 1;
   return self.next;
 }
 
-Observation wait_for_next(Frontend& self, nb::handle timeout) {
-  const o80::Timeout patience = timeout_of(timeout);
-  const auto frontend = self.shared();
-  Iteration next = next_of(self);
-  Observation observation = next_row(frontend, self.decoder(), next, patience);
-  // another thread may have read a row or attached again meanwhile
-  if (frontend == self.shared()) self.next = std::max(self.next, next);
-  return observation;
+Observation wait_for_next(Frontend& self, Patience timeout) {
+  return next_row_of(self, self.shared(), next_of(self), timeout);
 }
 
 /// Waits until a row is published; it may be overwritten since.
@@ -73,8 +74,7 @@ void await_row(const UntypedFrontend& frontend, Iteration k, o80::Timeout timeou
 
 /// The frontends whose rows are published, with these rows. None as a row is the next in sequence.
 std::vector<std::pair<Frontend*, Observation>> wait_for_first(
-    const std::vector<std::pair<Frontend*, nb::object>>& wanted, nb::handle timeout) {
-  const o80::Timeout patience = timeout_of(timeout);
+    const std::vector<std::pair<Frontend*, nb::object>>& wanted, Patience timeout) {
   std::vector<std::shared_ptr<UntypedFrontend>> alive;
   std::vector<o80::RowWish> wishes;
   for (const auto& [frontend, iteration] : wanted) {
@@ -84,15 +84,12 @@ std::vector<std::pair<Frontend*, Observation>> wait_for_first(
     wishes.push_back({.frontend = alive.back().get(), .row = row});
   }
   const std::vector<std::size_t> there =
-      without_gil([&] { return o80::wait_for_first(wishes, patience, Waiting::keep_waiting); });
+      without_gil([&] { return o80::wait_for_first(wishes, timeout, Waiting::keep_waiting); });
   std::vector<std::pair<Frontend*, Observation>> rows;
   for (const std::size_t i : there) {
     Frontend& frontend = *wanted[i].first;
     if (wanted[i].second.is_none()) {
-      Iteration next = wishes[i].row;
-      rows.emplace_back(&frontend, next_row(alive[i], frontend.decoder(), next, {}));
-      // another thread may have attached again
-      if (alive[i] == frontend.shared()) frontend.next = std::max(frontend.next, next);
+      rows.emplace_back(&frontend, next_row_of(frontend, alive[i], wishes[i].row, {}));
     } else {
       Observation observation = frontend.blank();
       alive[i]->wait_for(wishes[i].row, observation.row.bytes(), std::chrono::nanoseconds(0));
@@ -110,26 +107,24 @@ struct Stream {
   o80::Timeout timeout;
 };
 
-Stream open_stream(const Frontend& self, nb::handle since, nb::handle timeout) {
+Stream open_stream(const Frontend& self, nb::handle since, Patience timeout) {
   const Iteration next = self.untyped().published() + 1;
   const Iteration first = since.is_none() ? next : count_of(since, "since");
-  return {self.shared(), self.decoder(), std::max<Iteration>(first, 0), timeout_of(timeout)};
+  return {self.shared(), self.decoder(), std::max<Iteration>(first, 0), timeout};
 }
 
 /// Fills an array of rows; returns the first iteration and the number of rows. With parts (those of
 /// HistoryReader, as numbers) a row of the array has `packed` bytes.
-std::pair<Iteration, std::size_t> read_rows(const Frontend& self, Iteration first, nb::handle array,
-                                            nb::handle parts, std::size_t packed) {
-  using Part = o80::HistoryReader::Part;
-  const Bytes bytes(array, PyBUF_WRITABLE);
-  const std::span<std::byte> to = bytes.writable();
-  const auto wanted = parts.is_none() ? std::vector<Part>() : numbers_in<Part>(parts);
+std::pair<Iteration, std::size_t> read_rows(const Frontend& self, Iteration first,
+                                            std::span<std::byte> to,
+                                            std::span<const o80::HistoryReader::Part> parts,
+                                            std::size_t packed) {
   const auto frontend = self.shared();
   const o80::HistoryReader& history = frontend->link()->history;
   const Waiting waiting;
   const o80::HistoryReader::Range range =
-      wanted.empty() ? history.read_range(first, to.size() / history.row_bytes(), to.data())
-                     : history.read_parts(first, to.size() / packed, wanted, packed, to.data());
+      parts.empty() ? history.read_range(first, to.size() / history.row_bytes(), to.data())
+                    : history.read_parts(first, to.size() / packed, parts, packed, to.data());
   return {range.first, range.count};
 }
 
@@ -164,24 +159,18 @@ void bind_reading(nb::module_& m, nb::class_<Frontend>& frontend) {
            [](const Stream& self) { await_row(*self.frontend, self.next, self.timeout); });
   refuse_to_pickle(stream, "a stream", "its frontend, and open a stream of that");
 
-  def_verb(frontend, "latest", verbs::latest, &latest);
-  def_verb(frontend, "wait_for", verbs::wait_for, &wait_for, "iteration"_a.none(),
-           "timeout"_a = nb::none());
-  def_verb(frontend, "wait_for_next", verbs::wait_for_next, &wait_for_next,
-           "timeout"_a = nb::none());
-  def_verb(frontend, "stream", verbs::stream, &open_stream, "since"_a = nb::none(),
-           "timeout"_a = nb::none());
-  def_noun(frontend, "published", verbs::published,
-           [](const Frontend& self) { return self.untyped().published(); });
-  def_noun(frontend, "oldest", verbs::oldest,
-           [](const Frontend& self) { return self.untyped().oldest(); });
+  def_verb(frontend, verbs::latest, &latest);
+  def_verb(frontend, verbs::wait_for, &wait_for, "iteration"_a.none(), "timeout"_a = nb::none());
+  def_verb(frontend, verbs::wait_for_next, &wait_for_next, "timeout"_a = nb::none());
+  def_verb(frontend, verbs::stream, &open_stream, "since"_a = nb::none(), "timeout"_a = nb::none());
+  def_noun(frontend, verbs::published, &of_core<&UntypedFrontend::published>);
+  def_noun(frontend, verbs::oldest, &of_core<&UntypedFrontend::oldest>);
   m.def("wait_for_first", &wait_for_first, "wanted"_a, "timeout"_a.none());
   frontend.def_prop_ro("_next", &next_of)
       .def(
           "_await_row",
-          [](const Frontend& self, Iteration k, nb::handle timeout) {
-            const std::shared_ptr<UntypedFrontend> alive = self.shared();
-            await_row(*alive, k, timeout_of(timeout));
+          [](const Frontend& self, Iteration k, Patience timeout) {
+            await_row(*self.shared(), k, timeout);
           },
           "iteration"_a, "timeout"_a.none())
       .def(
@@ -194,5 +183,6 @@ void bind_reading(nb::module_& m, nb::class_<Frontend>& frontend) {
             return Observation(self.decoder(), self.shared()->at_time(time));
           },
           "time"_a)
-      .def("_read_rows", &read_rows, "first"_a, "array"_a, "parts"_a = nb::none(), "packed"_a = 0);
+      .def("_read_rows", &read_rows, "first"_a, "array"_a, "parts"_a = nb::bytes("", 0),
+           "packed"_a = 0);
 }

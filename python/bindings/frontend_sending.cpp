@@ -9,7 +9,6 @@
 #include "arguments.hpp"
 #include "base/printable.hpp"
 #include "batch.hpp"
-#include "buffer.hpp"
 #include "control/batch/command_check.hpp"
 #include "control/batch/record.hpp"
 #include "control/motion/number_plan.hpp"
@@ -18,6 +17,7 @@
 #include "enums.hpp"
 #include "frontend.hpp"
 #include "runtime/frontend/link.hpp"
+#include "states.hpp"
 #include "verb.hpp"
 #include "waiting.hpp"
 
@@ -26,6 +26,8 @@ using o80::UntypedFrontend;
 
 namespace {
 
+using ConstBytes = std::span<const std::byte>;
+
 std::uint32_t add_command(const Frontend& self, nb::handle actuator, nb::handle target,
                           nb::handle duration, nb::handle speed, nb::handle until,
                           nb::handle iterations, nb::handle fastest, nb::handle mode,
@@ -33,7 +35,7 @@ std::uint32_t add_command(const Frontend& self, nb::handle actuator, nb::handle 
   const o80::CommandOptions options =
       command_options(duration, speed, until, iterations, fastest, mode, profile, start, every,
                       self.untyped().schema().head.period);
-  if (clip.is(nb::bool_(false)) && !names_several(self.expanded(actuator))) {
+  if (clip.is(nb::bool_(false)) && self.names_one(actuator)) {
     return self.add_command(actuator, target, options);
   }
   const auto frontend = self.shared();
@@ -85,10 +87,9 @@ std::tuple<std::int64_t, std::string, nb::bytes> preview(const Frontend& self, n
 /// Rows of targets for several actuators: all rows of the first, then all rows of the second, and
 /// so on; `masks` has for each actuator a bit for each number that is given, or is empty.
 Targets rows_of(const Frontend& self, const std::vector<std::uint32_t>& actuators,
-                std::uint32_t rows, nb::handle states, const std::vector<std::uint64_t>& masks,
+                std::uint32_t rows, ConstBytes states, const std::vector<std::uint64_t>& masks,
                 nb::handle clip) {
-  const Bytes all(states);
-  Targets targets{actuators, {all.span().begin(), all.span().end()}, masks};
+  Targets targets{actuators, {states.begin(), states.end()}, masks};
   self.clip(clip, targets, rows);
   return targets;
 }
@@ -96,15 +97,14 @@ Targets rows_of(const Frontend& self, const std::vector<std::uint32_t>& actuator
 /// Adds one trajectory for several actuators, with these rows_of(); `times` are the ends of rows
 /// [ns].
 std::uint32_t add_trajectories(const Frontend& self, const std::vector<std::uint32_t>& actuators,
-                               std::uint32_t rows, nb::handle states,
-                               const std::vector<std::uint64_t>& masks, nb::handle times,
+                               std::uint32_t rows, ConstBytes states,
+                               const std::vector<std::uint64_t>& masks,
+                               std::span<const std::int64_t> times,
                                const o80::CommandOptions& options, nb::handle clip) {
   const auto frontend = self.shared();
-  std::vector<std::int64_t> ends;
-  if (!times.is_none()) ends = numbers_in<std::int64_t>(times);
   const Targets targets = rows_of(self, actuators, rows, states, masks, clip);
   const std::uint32_t place =
-      frontend->add_trajectories(actuators, rows, targets.states, options, ends, masks);
+      frontend->add_trajectories(actuators, rows, targets.states, options, times, masks);
   self.note_clipped(targets);
   return place;
 }
@@ -120,23 +120,20 @@ Batch pulse_to_end(const Frontend& self, nb::handle at, nb::handle late, nb::han
   return self.released([&](UntypedFrontend& frontend) { return frontend.pulse_to_end(options); });
 }
 
-Observation wait_for_end(const Frontend& self, const Batch& batch, nb::handle timeout,
+Observation wait_for_end(const Frontend& self, const Batch& batch, Patience timeout,
                          nb::handle check) {
-  const o80::Timeout patience = timeout_of(timeout);
   const o80::WaitOptions options{.check = truth_of(check, "check")};
   const auto frontend = self.shared();
   const auto decoder = self.decoder();
   return Observation(decoder, carrying(batch, [&] {
-                       return frontend->wait_for_end(batch, patience, Waiting::keep_waiting,
+                       return frontend->wait_for_end(batch, timeout, Waiting::keep_waiting,
                                                      options);
                      }));
 }
 
-Observation pulse_and_wait(const Frontend& self, nb::handle timeout, nb::handle at, nb::handle late,
+Observation pulse_and_wait(const Frontend& self, Patience timeout, nb::handle at, nb::handle late,
                            nb::handle seen, nb::handle check) {
-  // refused before anything is sent
-  timeout_of(timeout);
-  truth_of(check, "check");
+  truth_of(check, "check");  // refused before anything is sent
   return wait_for_end(self, pulse_to_end(self, at, late, seen), timeout, check);
 }
 
@@ -155,14 +152,13 @@ PendingBurst start_burst(const Frontend& self, nb::handle iterations, nb::handle
   });
 }
 
-Observation burst(const Frontend& self, nb::handle iterations, nb::handle timeout, nb::handle at,
+Observation burst(const Frontend& self, nb::handle iterations, Patience timeout, nb::handle at,
                   nb::handle late, nb::handle seen) {
   const std::int64_t count = burst_length(iterations);
-  const o80::Timeout patience = timeout_of(timeout);
   const o80::PulseOptions options = pulse_options(at, late, seen);
   const auto decoder = self.decoder();
   return Observation(decoder, self.released([&](UntypedFrontend& frontend) {
-    return frontend.burst(count, patience, Waiting::keep_waiting, options);
+    return frontend.burst(count, timeout, Waiting::keep_waiting, options);
   }));
 }
 
@@ -186,12 +182,11 @@ std::vector<PendingBurst> start_bursts(const std::vector<std::pair<Frontend*, nb
 }
 
 std::vector<Observation> wait_for_bursts(const std::vector<PendingBurst>& pending,
-                                         nb::handle timeout) {
-  const o80::Timeout patience = timeout_of(timeout);
+                                         Patience timeout) {
   std::vector<o80::Burst> bursts;
   for (const PendingBurst& one : pending) bursts.push_back(one.burst);
   std::vector<o80::UntypedObservation> rows =
-      without_gil([&] { return o80::wait_for(bursts, patience, Waiting::keep_waiting); });
+      without_gil([&] { return o80::wait_for(bursts, timeout, Waiting::keep_waiting); });
   std::vector<Observation> observations;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     observations.emplace_back(pending[i].decoder, std::move(rows[i]));
@@ -199,21 +194,20 @@ std::vector<Observation> wait_for_bursts(const std::vector<PendingBurst>& pendin
   return observations;
 }
 
-/// Sends a batch of one record at once.
-template <class Fill>
-Batch send_alone(const Frontend& self, Fill&& fill, const std::optional<o80::Seen>& seen = {}) {
+/// Sends a batch of one record at once. `add`: the method of BatchBuilder for it.
+template <auto add, class... Arguments>
+Batch send_alone(const Frontend& self, const Arguments&... arguments) {
   o80::BatchBuilder batch;
-  fill(batch);
-  return self.released([&](UntypedFrontend& frontend) { return frontend.pulse(batch, seen); });
+  (batch.*add)(arguments...);
+  return self.released([&](UntypedFrontend& frontend) { return frontend.pulse(batch); });
 }
 
 /// Sends a chunk. `due`: for each row an uint32, iterations after the anchor.
-Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuators, nb::handle due,
-                 nb::handle states, const std::vector<std::uint64_t>& masks, o80::Iteration anchor,
-                 std::uint64_t plan, std::uint32_t ease, std::uint32_t first, bool fixed,
-                 bool reject_late, bool final, nb::handle profile, nb::handle seen,
-                 std::size_t clipped) {
-  const std::vector<std::uint32_t> ends = numbers_in<std::uint32_t>(due);
+Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuators,
+                 std::span<const std::uint32_t> due, ConstBytes states,
+                 const std::vector<std::uint64_t>& masks, o80::Iteration anchor, std::uint64_t plan,
+                 std::uint32_t ease, std::uint32_t first, bool fixed, bool reject_late, bool final,
+                 nb::handle profile, nb::handle seen, std::size_t clipped) {
   const o80::ChunkOptions options{.anchor = anchor,
                                   .plan = plan,
                                   .ease = ease,
@@ -222,12 +216,12 @@ Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuato
                                   .reject_late = reject_late,
                                   .final = final,
                                   .profile = profile_of_rows(profile)};
-  const Bytes all(states);
-  const auto fill = [&](o80::BatchBuilder& batch) {
-    self.untyped().add_chunk(batch, actuators, ends, all.span(), options, masks);
-    batch.note_clipped(clipped);
-  };
-  const Batch sent = send_alone(self, fill, seen_of(seen));
+  const std::optional<o80::Seen> decided = seen_of(seen);
+  o80::BatchBuilder batch;
+  self.untyped().add_chunk(batch, actuators, due, states, options, masks);
+  batch.note_clipped(clipped);
+  const Batch sent =
+      self.released([&](UntypedFrontend& frontend) { return frontend.pulse(batch, decided); });
   self.clipped += static_cast<std::int64_t>(clipped);
   return sent;
 }
@@ -310,7 +304,7 @@ Batch send_request(const Frontend& self, nb::handle name, nb::handle fields, nb:
   const std::optional<o80::Seen> decided = seen_of(seen);
   const auto frontend = self.shared();
   const std::uint32_t index = frontend->request_index(string_of(name, "the name of a request"));
-  const std::vector<std::byte> payload = self.request_bytes(index, fields);
+  const auto payload = request_bytes(frontend->schema(), index, fields);
   frontend->command_check().request(index, payload);
   o80::BatchBuilder batch;
   batch.request(static_cast<std::uint16_t>(index), payload);
@@ -318,16 +312,15 @@ Batch send_request(const Frontend& self, nb::handle name, nb::handle fields, nb:
   return frontend->pulse_to_end(batch, decided);
 }
 
-void wait_until_ended(const Frontend& self, const Batch& batch, nb::handle timeout) {
-  const o80::Timeout patience = timeout_of(timeout);
+void wait_until_ended(const Frontend& self, const Batch& batch, Patience timeout) {
   const auto frontend = self.shared();
-  carrying(batch, [&] { frontend->wait_until_ended(batch, patience, Waiting::keep_waiting); });
+  carrying(batch, [&] { frontend->wait_until_ended(batch, timeout, Waiting::keep_waiting); });
 }
 
 std::uint32_t add_request(const Frontend& self, nb::handle name, const nb::kwargs& fields) {
   const auto frontend = self.shared();
   const std::uint32_t index = frontend->request_index(string_of(name, "the name of a request"));
-  return frontend->add_request(index, self.request_bytes(index, fields));
+  return frontend->add_request(index, request_bytes(frontend->schema(), index, fields));
 }
 
 }  // namespace
@@ -343,56 +336,53 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
         "low"_a, "high"_a);
   m.def("first_row", &first_row, "due"_a, "begins"_a, "ease"_a, "starts"_a, "rows"_a, "rates"_a);
   const auto all = "actuator"_a = nb::none();
-  def_verb(frontend, "add_command", verbs::add_command, &add_command, "actuator"_a.none(),
-           "target"_a.none(), nb::kw_only(), "duration"_a = nb::none(), "speed"_a = nb::none(),
-           "until"_a = nb::none(), "iterations"_a = nb::none(), "fastest"_a.none() = false,
-           "mode"_a.none() = "queue", "profile"_a = nb::none(), "start"_a.none() = "desired",
-           "every"_a = nb::none(), "clip"_a.none() = false);
-  def_noun(frontend, "clipped", verbs::clipped, [](const Frontend& self) {
+  def_verb(frontend, verbs::add_command, &add_command, "actuator"_a.none(), "target"_a.none(),
+           nb::kw_only(), "duration"_a = nb::none(), "speed"_a = nb::none(), "until"_a = nb::none(),
+           "iterations"_a = nb::none(), "fastest"_a.none() = false, "mode"_a.none() = "queue",
+           "profile"_a = nb::none(), "start"_a.none() = "desired", "every"_a = nb::none(),
+           "clip"_a.none() = false);
+  def_noun(frontend, verbs::clipped, [](const Frontend& self) {
     self.untyped().added();  // in a forked child it raises
     return self.clipped;
   });
-  def_verb(frontend, "add_request", verbs::add_request, &add_request, "name"_a.none(), "fields"_a);
+  def_verb(frontend, verbs::add_request, &add_request, "name"_a.none(), "fields"_a);
   def_verb(
-      frontend, "add_purge", verbs::add_purge,
+      frontend, verbs::add_purge,
       [](const Frontend& self, nb::handle actuator) {
         return self.untyped().add_purge(purged(self, actuator));
       },
       all);
   def_verb(
-      frontend, "purge", verbs::purge,
+      frontend, verbs::purge,
       [](const Frontend& self, nb::handle actuator) {
-        const std::uint16_t which = purged(self, actuator);
-        return send_alone(self, [&](o80::BatchBuilder& batch) { batch.purge(which); });
+        return send_alone<&o80::BatchBuilder::purge>(self, purged(self, actuator));
       },
       all);
   def_verb(
-      frontend, "mark", verbs::mark,
+      frontend, verbs::mark,
       [](const Frontend& self, nb::handle text) {
         const std::string line = string_of(text, "the text of a mark");
         if (o80::printable(line) != line) {
           refuse("the text of a mark", "one line of printable text", text);
         }
-        return send_alone(self, [&](o80::BatchBuilder& batch) { batch.mark(line); });
+        return send_alone<&o80::BatchBuilder::mark>(self, line);
       },
       "text"_a.none());
-  def_noun(frontend, "added", verbs::added,
-           [](const Frontend& self) { return self.untyped().added(); });
-  def_verb(frontend, "forget_added", verbs::forget_added,
-           [](const Frontend& self) { self.untyped().forget_added(); });
-  def_verb(frontend, "pulse", verbs::pulse, &pulse, nb::kw_only(), "at"_a = nb::none(),
+  def_noun(frontend, verbs::added, &of_core<&UntypedFrontend::added>);
+  def_verb(frontend, verbs::forget_added, &of_core<&UntypedFrontend::forget_added>);
+  def_verb(frontend, verbs::pulse, &pulse, nb::kw_only(), "at"_a = nb::none(),
            "late"_a.none() = "reject", "seen"_a = nb::none());
-  def_verb(frontend, "pulse_and_wait", verbs::pulse_and_wait, &pulse_and_wait,
-           "timeout"_a = nb::none(), nb::kw_only(), "at"_a = nb::none(), "late"_a.none() = "reject",
-           "seen"_a = nb::none(), "check"_a.none() = true);
+  def_verb(frontend, verbs::pulse_and_wait, &pulse_and_wait, "timeout"_a = nb::none(),
+           nb::kw_only(), "at"_a = nb::none(), "late"_a.none() = "reject", "seen"_a = nb::none(),
+           "check"_a.none() = true);
 
   frontend
       .def("_add_trajectories", &add_trajectories, "actuators"_a, "rows"_a, "states"_a, "masks"_a,
-           "times"_a.none(), "options"_a, "clip"_a.none())
+           "times"_a, "options"_a, "clip"_a.none())
       .def(
           "_clip",
           [](const Frontend& self, const std::vector<std::uint32_t>& actuators, std::uint32_t rows,
-             nb::handle states, const std::vector<std::uint64_t>& masks) {
+             ConstBytes states, const std::vector<std::uint64_t>& masks) {
             const Targets inside = rows_of(self, actuators, rows, states, masks, nb::bool_(true));
             return std::pair(bytes_of(inside.states), inside.clipped);
           },
@@ -400,12 +390,7 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
       .def("_send_chunk", &send_chunk, "actuators"_a, "due"_a, "states"_a, "masks"_a, "anchor"_a,
            "plan"_a, "ease"_a, "first"_a, "fixed"_a, "reject_late"_a, "final"_a, "profile"_a,
            "seen"_a.none(), "clipped"_a)
-      .def(
-          "_close_plan",
-          [](const Frontend& self, std::uint64_t plan) {
-            send_alone(self, [&](o80::BatchBuilder& batch) { batch.close_plan(plan); });
-          },
-          "plan"_a)
+      .def("_close_plan", &send_alone<&o80::BatchBuilder::close_plan, std::uint64_t>, "plan"_a)
       .def(
           "_since",
           [](const Frontend& self, nb::handle seen) {
@@ -414,20 +399,18 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
           "seen"_a)
       .def("_purge_own",
            [](const Frontend& self) {
-             return send_alone(
-                 self, [](o80::BatchBuilder& batch) { batch.purge_own(o80::kEveryActuator); });
+             return send_alone<&o80::BatchBuilder::purge_own>(self, o80::kEveryActuator);
            })
-      .def("_take_control",
-           [](const Frontend& self) {
-             return send_alone(self, [](o80::BatchBuilder& batch) { batch.take_control(); });
-           })
-      .def("_release_control",
-           [](const Frontend& self) {
-             return send_alone(self, [](o80::BatchBuilder& batch) { batch.release_control(); });
-           })
+      .def("_take_control", &send_alone<&o80::BatchBuilder::take_control>)
+      .def("_release_control", &send_alone<&o80::BatchBuilder::release_control>)
       .def("_preview", &preview, "actuators"_a.none(), "target"_a.none(), "initial"_a.none(),
            "options"_a)
-      .def("_index", &Frontend::actuator, "named"_a.none())
+      .def(
+          "_chosen",
+          [](const Frontend& self, nb::handle named) {
+            return std::pair(self.actuators(named), self.names_one(named));
+          },
+          "actuators"_a.none(), "Their indices; True if it is one index or name of an actuator.")
       .def("_send_request", &send_request, "name"_a.none(), "fields"_a, "seen"_a.none())
       .def("_wait_until_ended", &wait_until_ended, "batch"_a, "timeout"_a.none())
       .def("_pulse_to_end", &pulse_to_end, "at"_a.none(), "late"_a.none(), "seen"_a.none())

@@ -10,7 +10,6 @@
 
 #include "arguments.hpp"
 #include "bindings.hpp"
-#include "buffer.hpp"
 #include "enums.hpp"
 #include "frontend.hpp"
 #include "loop_options.hpp"
@@ -24,14 +23,12 @@ namespace {
 
 const o80::KeepWaiting kKeepWaiting = Waiting::keep_waiting;
 
-template <class T>
-std::span<const T> numbers_of(const Bytes& bytes) {
-  return {reinterpret_cast<const T*>(bytes.span().data()), bytes.span().size() / sizeof(T)};
-}
+using ConstBytes = std::span<const std::byte>;
+using Copies = std::span<const std::uint32_t>;  // their numbers
 
 template <class T>
-std::span<T> writable_numbers_of(const Bytes& bytes) {
-  return {reinterpret_cast<T*>(bytes.writable().data()), bytes.writable().size() / sizeof(T)};
+std::span<T> numbers_in(const Bytes& bytes) {
+  return {static_cast<T*>(bytes.view.buf), bytes.writable().size() / sizeof(T)};
 }
 
 class Group;
@@ -62,14 +59,13 @@ class PreparedBurst {
 
   const o80::InlineGroup::BurstPlan& plan() const { return plan_; }
   /// As the burst of one robot. Returns its last iteration.
-  o80::Iteration run(const Frontend& self, nb::handle timeout, nb::handle at, nb::handle late,
+  o80::Iteration run(const Frontend& self, Patience timeout, nb::handle at, nb::handle late,
                      nb::handle seen) const {
     const o80::PulseOptions options = pulse_options(at, late, seen);
-    const o80::Timeout patience = timeout_of(timeout);
     const auto frontend = self.shared();
     plan_.add_targets(*frontend, plan_.targets);
     const Waiting waiting;
-    return frontend->burst_rows(plan_.rows, patience, Waiting::keep_waiting, options);
+    return frontend->burst_rows(plan_.rows, timeout, Waiting::keep_waiting, options);
   }
 
  private:
@@ -87,22 +83,16 @@ o80::RowNumber row_number(const NumberPlace& place) {
   return {std::get<0>(place), kind_of(std::get<1>(place))};
 }
 
-o80::EventFlag::Compare compare_of(const std::string& word) {
-  using Compare = o80::EventFlag::Compare;
-  constexpr std::pair<const char*, Compare> kWords[] = {
-      {"==", Compare::equal},      {"!=", Compare::unequal}, {"<", Compare::less},
-      {"<=", Compare::less_equal}, {">", Compare::greater},  {">=", Compare::greater_equal}};
-  for (const auto& [name, compare] : kWords) {
-    if (word == name) return compare;
-  }
-  throw o80::InvalidArgument("a flag compares with ==, !=, <, <=, > or >=, got '" + word + "'");
+o80::EventFlag::Compare compare_of(nb::handle word) {
+  constexpr std::string_view kWords[] = {"==", "!=", "<", "<=", ">", ">="};  // in their order
+  return static_cast<o80::EventFlag::Compare>(place_of(word, kWords, "the comparison of a flag"));
 }
 
 /// The compiled half of o80.InlineGroup.
 class Group {
  public:
   using Number = std::tuple<NumberPlace, double, double, double, double>;
-  using Flag = std::tuple<NumberPlace, std::string, double>;
+  using Flag = std::tuple<NumberPlace, nb::object, double>;
 
   explicit Group(std::shared_ptr<o80::InlineGroup> group) : group_(std::move(group)) {}
 
@@ -113,41 +103,27 @@ class Group {
     group_->publish_as(copy, name);
   }
   /// `instead`: for each copy of the group whether it runs a request; `payloads`: for each copy.
-  void burst(const PreparedBurst& burst, nb::handle copies, nb::handle timeout, nb::handle instead,
-             std::uint32_t request, nb::handle payloads) const {
-    const Bytes chosen(copies);
-    const Bytes others(instead);
-    const Bytes given(payloads);
-    const o80::Timeout patience = timeout_of(timeout);
-    const auto group = group_;
+  void burst(const PreparedBurst& burst, Copies copies, Patience timeout,
+             std::span<const std::uint8_t> instead, std::uint32_t request,
+             ConstBytes payloads) const {
     const Waiting waiting;
-    group->burst(burst.plan(), numbers_of<std::uint32_t>(chosen), patience, kKeepWaiting,
-                 {numbers_of<std::uint8_t>(others), request, given.span()});
+    group_->burst(burst.plan(), copies, timeout, kKeepWaiting, {instead, request, payloads});
   }
   /// The bytes of requests with these fields, one after the other. `each`: a mapping for each.
   nb::bytes payloads(std::uint32_t request, const std::vector<nb::object>& each) const {
-    const o80::Schema& schema = group_->description().schema;
-    const o80::RequestRow& row = schema.requests[request];
-    const std::string what = "request '" + row.name.str() + "'";
     std::vector<std::byte> all;
     for (const nb::object& fields : each) {
-      const StateBytes payload(schema, row.type, fields, what, Missing::by_default);
-      all.insert(all.end(), payload.bytes.begin(), payload.bytes.end());
+      const auto payload = request_bytes(group_->description().schema, request, fields);
+      all.insert(all.end(), payload.begin(), payload.end());
     }
     return bytes_of(all);
   }
   std::uint32_t request_index(const std::string& name) const { return group_->request_index(name); }
   /// `payloads`: one for each of the copies; `rows`: none, or one for each copy of the group.
-  void request(std::uint32_t request, nb::handle copies, nb::handle payloads, nb::handle rows,
-               nb::handle timeout) const {
-    const Bytes chosen(copies);
-    const Bytes given(payloads);
-    const Bytes filled(rows, PyBUF_WRITABLE);
-    const o80::Timeout patience = timeout_of(timeout);
-    const auto group = group_;
+  void request(std::uint32_t request, Copies copies, ConstBytes payloads, std::span<std::byte> rows,
+               Patience timeout) const {
     const Waiting waiting;
-    group->request(request, numbers_of<std::uint32_t>(chosen), given.span(), patience, kKeepWaiting,
-                   filled.writable());
+    group_->request(request, copies, payloads, timeout, kKeepWaiting, rows);
   }
   /// By copy.
   std::map<std::size_t, HaltFields> halted() const {
@@ -155,18 +131,11 @@ class Group {
     for (const auto& [copy, halt] : group_->halted()) found.emplace(copy, *halt_fields(halt));
     return found;
   }
-  void resume(nb::handle copies, nb::handle timeout) const {
-    const Bytes chosen(copies);
-    const o80::Timeout patience = timeout_of(timeout);
-    const auto group = group_;
+  void resume(Copies copies, Patience timeout) const {
     const Waiting waiting;
-    group->resume(numbers_of<std::uint32_t>(chosen), patience, kKeepWaiting);
+    group_->resume(copies, timeout, kKeepWaiting);
   }
-  void latest(nb::handle copies, nb::handle rows) const {
-    const Bytes chosen(copies);
-    const Bytes filled(rows, PyBUF_WRITABLE);
-    group_->latest(numbers_of<std::uint32_t>(chosen), filled.writable());
-  }
+  void latest(Copies copies, std::span<std::byte> rows) const { group_->latest(copies, rows); }
   void gather(const std::vector<Number>& numbers, const std::vector<Flag>& flags,
               nb::handle observations, nb::handle raised) {
     o80::RowGather gather;
@@ -179,14 +148,13 @@ class Group {
     auto memory = std::make_unique<std::pair<Bytes, Bytes>>(
         std::piecewise_construct, std::forward_as_tuple(observations, PyBUF_WRITABLE),
         std::forward_as_tuple(raised, PyBUF_WRITABLE));
-    group_->gather(std::move(gather), {writable_numbers_of<float>(memory->first),
-                                       writable_numbers_of<std::uint8_t>(memory->second)});
+    group_->gather(std::move(gather),
+                   {numbers_in<float>(memory->first), numbers_in<std::uint8_t>(memory->second)});
     gathered_ = std::move(memory);
   }
   void close() const {
-    const auto group = group_;
     const Waiting waiting;
-    group->close();
+    group_->close();
   }
 
  private:

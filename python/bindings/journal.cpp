@@ -8,7 +8,6 @@
 
 #include "base/printable.hpp"
 #include "bindings.hpp"
-#include "buffer.hpp"
 #include "enums.hpp"
 #include "frontend.hpp"
 #include "runtime/frontend/raw_journal.hpp"
@@ -70,10 +69,10 @@ auto read_raw(o80::RawJournal& journal, std::size_t most) {
                     entries.notable);
 }
 
-std::vector<o80::JournalEntry> decoded(o80::RecordedJournal& journal, const nb::bytes& bytes,
-                                       std::int64_t codec) {
+std::vector<o80::JournalEntry> decoded(o80::RecordedJournal& journal,
+                                       std::span<const std::byte> bytes, std::int64_t codec) {
   std::vector<o80::JournalEntry> entries;
-  journal.decode(span_of(bytes), entries, codec);
+  journal.decode(bytes, entries, codec);
   return entries;
 }
 

@@ -11,6 +11,8 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "buffer.hpp"
+
 // Every binding includes all casters by this header: without its caster, a cast compiles to a throw
 // of std::bad_cast, and the linker may take that copy of the function for all other files.
 

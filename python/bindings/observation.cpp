@@ -5,25 +5,43 @@
 #include <span>
 
 #include "bindings.hpp"
-#include "buffer.hpp"
 #include "describe/table.hpp"
 #include "interpreter.hpp"
 #include "o80/base/error.hpp"
 #include "schema_tables.hpp"
 
+namespace {
+
+struct Part {
+  const char* name;
+  const char* signature;
+  const char* help;
+};
+constexpr Part kParts[] = {
+    {"desired", "def desired(self) -> States",
+     "The desired states: an array (actuators,), or a record of groups."},
+    {"observed", "def observed(self) -> States",
+     "The observed states: an array (actuators,), or a record of groups."},
+    {"extended", "def extended(self) -> Record",
+     "Further sensor values: a record with a value for each field."},
+    {"active", "def active(self) -> numpy.typing.NDArray[numpy.bool_]",
+     "True where a command or braking gave the desired state: bool (actuators,)."},
+    {"clamped", "def clamped(self) -> numpy.typing.NDArray[numpy.bool_]",
+     "True where the limits changed the desired state: bool (actuators,)."},
+    {"braking", "def braking(self) -> numpy.typing.NDArray[numpy.bool_]",
+     "True where the actuator comes to rest without a command: bool (actuators,)."},
+    {"starved", "def starved(self) -> numpy.typing.NDArray[numpy.bool_]",
+     "True where a plan of chunks has no row left and is not closed: bool (actuators,)."},
+    {"off_plan", "def off_plan(self) -> numpy.typing.NDArray[numpy.float32]",
+     "How far the desired states are from what commands ask for, where limits change them: "
+     "(actuators,), the most of the numbers of each, in their units."}};
+
+}  // namespace
+
 Decoder::Decoder(std::shared_ptr<const o80::Description> what, nb::object how)
-    : description(std::move(what)),
-      layout(std::move(how)),
-      desired(layout.attr("way_to")("desired")),
-      observed(layout.attr("way_to")("observed")),
-      extended(layout.attr("extended")),
-      active(layout.attr("active")),
-      clamped(layout.attr("clamped")),
-      braking(layout.attr("braking")),
-      starved(layout.attr("starved")),
-      off_plan(layout.attr("off_plan")),
-      flat(layout.attr("flat")),
-      text(layout.attr("text")) {}
+    : description(std::move(what)), layout(std::move(how)), flat(layout.attr("flat")) {
+  for (const Part& part : kParts) ways.push_back(layout.attr("way_to")(part.name));
+}
 
 Numpy::Numpy() {
   const nb::object capsule =
@@ -68,21 +86,26 @@ PyType_Slot buffer_slots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(&fill_bu
                               {0, nullptr}};
 
 /// A row copied out of an array of rows.
-Observation* from_bytes(std::shared_ptr<Decoder> decoder, nb::handle bytes, std::int64_t missed) {
+Observation* from_bytes(std::shared_ptr<const Decoder> decoder, std::span<const std::byte> row,
+                        std::int64_t missed) {
   auto observation = std::make_unique<Observation>(std::move(decoder));
-  const Bytes row(bytes);
-  if (row.span().size() != observation->row.size()) {
+  if (row.size() != observation->row.size()) {
     throw o80::InvalidArgument("a row of this robot has " +
                                std::to_string(observation->row.size()) + " bytes");
   }
-  std::memcpy(observation->row.bytes(), row.span().data(), row.span().size());
+  std::memcpy(observation->row.bytes(), row.data(), row.size());
   observation->missed = missed;
   return observation.release();
 }
 
-nb::object decoded(nb::handle self, nb::object Decoder::* how) {
-  const Decoder& decoder = *nb::inst_ptr<Observation>(self)->decoder;
-  const nb::handle way = decoder.*how;
+const Decoder& decoder_of(nb::handle observation) {
+  return *nb::inst_ptr<Observation>(observation)->decoder;
+}
+
+/// A part of a row; `place`: in kParts.
+nb::object decoded(nb::handle self, std::size_t place) {
+  const Decoder& decoder = decoder_of(self);
+  const nb::handle way = decoder.ways[place];
   return call_python([&]() -> nb::object {
     return PyTuple_CheckExact(way.ptr()) != 0 ? decoder.numpy.view(self, way) : way(self);
   });
@@ -96,41 +119,16 @@ nb::bytes table_of(const o80::Description& description) {
 nb::tuple reduce(nb::handle self) {
   const auto* observation = nb::inst_ptr<Observation>(self);
   const nb::bytes row(observation->row.bytes(), observation->row.size());
-  return nb::make_tuple(
-      self.type(), nb::make_tuple(nb::cast(std::const_pointer_cast<Decoder>(observation->decoder)),
-                                  row, observation->missed));
+  return nb::make_tuple(self.type(),
+                        nb::make_tuple(observation->decoder, row, observation->missed));
 }
 
-std::shared_ptr<o80::Description> description_from(nb::bytes schema, std::uint64_t epoch) {
-  o80::Schema read = o80::schema_from_bytes(span_of(schema));
+std::shared_ptr<o80::Description> description_from(std::span<const std::byte> schema,
+                                                   std::uint64_t epoch) {
+  o80::Schema read = o80::schema_from_bytes(schema);
   const o80::RowLayout layout = o80::row_layout(read);
   return std::make_shared<o80::Description>(o80::Description{std::move(read), layout, epoch});
 }
-
-struct Part {
-  const char* name;
-  nb::object Decoder::* how;
-  const char* signature;
-  const char* help;
-};
-constexpr Part kParts[] = {
-    {"desired", &Decoder::desired, "def desired(self) -> States",
-     "The desired states: an array (actuators,), or a record of groups."},
-    {"observed", &Decoder::observed, "def observed(self) -> States",
-     "The observed states: an array (actuators,), or a record of groups."},
-    {"extended", &Decoder::extended, "def extended(self) -> Record",
-     "Further sensor values: a record with a value for each field."},
-    {"active", &Decoder::active, "def active(self) -> numpy.typing.NDArray[numpy.bool_]",
-     "True where a command or braking gave the desired state: bool (actuators,)."},
-    {"clamped", &Decoder::clamped, "def clamped(self) -> numpy.typing.NDArray[numpy.bool_]",
-     "True where the limits changed the desired state: bool (actuators,)."},
-    {"braking", &Decoder::braking, "def braking(self) -> numpy.typing.NDArray[numpy.bool_]",
-     "True where the actuator comes to rest without a command: bool (actuators,)."},
-    {"starved", &Decoder::starved, "def starved(self) -> numpy.typing.NDArray[numpy.bool_]",
-     "True where a plan of chunks has no row left and is not closed: bool (actuators,)."},
-    {"off_plan", &Decoder::off_plan, "def off_plan(self) -> numpy.typing.NDArray[numpy.float32]",
-     "How far the desired states are from what commands ask for, where limits change them: "
-     "(actuators,), the most of the numbers of each, in their units."}};
 
 }  // namespace
 
@@ -144,10 +142,8 @@ void bind_observation(nb::module_& m) {
       .def("model", [](const o80::Description& self) { return self.schema.shown.mjcf; });
 
   nb::class_<Decoder>(m, "Decoder", "Converts rows of one robot to arrays.")
-      .def(nb::new_([](std::shared_ptr<o80::Description> description, nb::object layout) {
-             return std::make_shared<Decoder>(std::move(description), std::move(layout));
-           }),
-           "description"_a, "layout"_a)
+      .def(nb::init<std::shared_ptr<const o80::Description>, nb::object>(), "description"_a,
+           "layout"_a)
       .def_prop_ro(
           "layout", [](const Decoder& self) { return self.layout; },
           nb::sig("def layout(self) -> typing.Any"))
@@ -172,8 +168,8 @@ The arrays are views of this observation's own copy of the row, which does not c
       .def(
           "__getitem__",
           [](nb::handle self, nb::handle path) {
-            const auto& layout = nb::cast<const Observation&>(self).decoder->layout;
-            return nb::module_::import_("o80.rows.columns").attr("numbers_in")(self, layout, path);
+            const nb::object read = nb::module_::import_("o80.rows.columns").attr("numbers_in");
+            return read(self, decoder_of(self).layout, path);
           },
           nb::sig("def __getitem__(self, path: str) -> typing.Any"), "path"_a,
           "The numbers at a path: `row[\"observed.joint1.position\"]`, or of a group, (n,).")
@@ -210,19 +206,21 @@ The arrays are views of this observation's own copy of the row, which does not c
       .def(
           "flat",
           [](nb::handle self, nb::handle dtype) {
-            const auto* observation = nb::inst_ptr<Observation>(self);
-            return call_python([&] { return observation->decoder->flat(self, dtype); });
+            return call_python([&] { return decoder_of(self).flat(self, dtype); });
           },
           "dtype"_a = nb::none(),
           nb::sig("def flat(self, dtype: numpy.typing.DTypeLike | None = None) -> "
                   "numpy.typing.NDArray[typing.Any]"),
           "All observed numbers, then all extended ones, as one vector (default: float32).")
       .def(
-          "__repr__", [](nb::handle self) { return decoded(self, &Decoder::text); },
+          "__repr__",
+          [](nb::handle self) {
+            return call_python([&] { return decoder_of(self).layout.attr("text")(self); });
+          },
           nb::sig("def __repr__(self) -> str"));
-  for (const Part& part : kParts) {
+  for (std::size_t i = 0; i < std::size(kParts); ++i) {
     observation.def_prop_ro(
-        part.name, [how = part.how](nb::handle self) { return decoded(self, how); },
-        nb::sig(part.signature), part.help);
+        kParts[i].name, [i](nb::handle self) { return decoded(self, i); },
+        nb::sig(kParts[i].signature), kParts[i].help);
   }
 }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "nb.hpp"
 #include "o80/runtime/observation.hpp"
@@ -28,8 +29,8 @@ struct Decoder {
 
   std::shared_ptr<const o80::Description> description;
   Numpy numpy;
-  nb::object layout, desired, observed, extended, active, clamped, braking, starved, off_plan, flat,
-      text;
+  nb::object layout, flat;
+  std::vector<nb::object> ways;  // to the parts of a row
 };
 
 /// A row and its decoder. Python sees the bytes as a buffer.

@@ -163,6 +163,10 @@ void copy(Bytes& to, const void* from) {
   const auto block = to.writable();
   if (!block.empty()) std::memcpy(block.data(), from, block.size());
 }
+void copy(void* to, const Bytes& from) {
+  const auto block = from.span();
+  if (!block.empty()) std::memcpy(to, block.data(), block.size());
+}
 
 int write(void* robot, const o80::DesiredView* desired, FaultText* fault) {
   PythonDriver& self = driver(robot);
@@ -184,8 +188,7 @@ void take_report(PythonDriver& self, nb::handle told, o80::ReadingView* reading)
   reading->follows = reading->desired != nullptr && nb::cast<bool>(report[6]) ? 1 : 0;
   if (reading->desired != nullptr && nb::cast<bool>(report[2])) {
     reading->has_desired = 1;
-    const auto fresh = self.fresh->span();
-    std::memcpy(reading->desired, fresh.data(), fresh.size());
+    copy(reading->desired, *self.fresh);
   }
   if (!report[3].is_none()) {
     reading->halted = 1;
@@ -215,10 +218,8 @@ int read(void* robot, o80::ReadingView* reading, FaultText* fault) {
     for (std::size_t i = 0; i < self.requests; ++i) runs.append(reading->requests[i].runs != 0);
     const nb::object told = self.adapter.attr("read")(reading->iteration, reading->time,
                                                       reading->desired != nullptr, runs);
-    const auto observed = self.observed->span();
-    const auto extended = self.extended->span();
-    if (!observed.empty()) std::memcpy(reading->observed, observed.data(), observed.size());
-    if (!extended.empty()) std::memcpy(reading->extended, extended.data(), extended.size());
+    copy(reading->observed, *self.observed);
+    copy(reading->extended, *self.extended);
     if (!told.is_none()) take_report(self, told, reading);
   });
 }

@@ -54,13 +54,8 @@ void write_integer(nb::handle value, std::byte* to, const std::string& what) {
 
 template <class T>
 void write_float(nb::handle value, std::byte* to, const std::string& what) {
-  double number = 0;
-  if (PyFloat_CheckExact(value.ptr())) {
-    number = PyFloat_AS_DOUBLE(value.ptr());
-  } else {
-    number = PyFloat_AsDouble(value.ptr());
-    if (number == -1.0 && PyErr_Occurred() != nullptr) refuse(what, "a number", value);
-  }
+  const double number = PyFloat_AsDouble(value.ptr());
+  if (number == -1.0 && PyErr_Occurred() != nullptr) refuse(what, "a number", value);
   store(to, static_cast<T>(number));
 }
 
@@ -119,32 +114,26 @@ class Writer {
              const std::string& what) {
     if (const FieldRow* alone = plain_number(schema_, type)) {
       element(*alone, value, to, number, what);
-    } else if (has_names(value)) {
-      by_name(type, value, to, number, what);
+    } else if (const nb::object names = names_of(value); !names.is_none()) {
+      by_name(type, names, value, to, number, what);
     } else {
       in_order(type, value, to, number, what);
     }
   }
 
  private:
-  static bool has_names(nb::handle value) {
-    if (PyDict_Check(value.ptr())) return true;
-    if (nb::hasattr(value, "dtype")) return !value.attr("dtype").attr("names").is_none();
-    return nb::hasattr(value, "keys");
-  }
-
+  /// The names of the fields in a mapping, a record or a structured array; None for others.
   static nb::object names_of(nb::handle value) {
     if (nb::hasattr(value, "dtype")) return value.attr("dtype").attr("names");
-    return value.attr("keys")();
+    if (!nb::hasattr(value, "keys")) return nb::none();
+    return nb::list(nb::object(value.attr("keys")()));
   }
 
-  void by_name(std::uint32_t type, nb::handle value, std::byte* to, std::uint32_t number,
-               const std::string& what) {
+  void by_name(std::uint32_t type, nb::handle names, nb::handle value, std::byte* to,
+               std::uint32_t number, const std::string& what) {
     const o80::TypeRow& row = schema_.types[type];
     std::uint32_t found = 0;
     std::uint32_t place = number;
-    const nb::object names = nb::steal(PySequence_List(names_of(value).ptr()));
-    if (!names.is_valid()) throw nb::python_error();
     for (const FieldRow& member : fields_in(schema_, row)) {
       const nb::str name(member.name.view().data(), member.name.view().size());
       const int there = PySequence_Contains(names.ptr(), name.ptr());
@@ -175,8 +164,7 @@ class Writer {
   void in_order(std::uint32_t type, nb::handle value, std::byte* to, std::uint32_t number,
                 const std::string& what) {
     const o80::TypeRow& row = schema_.types[type];
-    const bool is_sequence = PySequence_Check(value.ptr()) != 0 && !PyUnicode_Check(value.ptr());
-    if (!is_sequence && schema_.scalar_count(type) == 1) {  // its only number needs no name
+    if (!is_sequence(value) && schema_.scalar_count(type) == 1) {  // its only number needs no name
       field(schema_.fields[row.first_field], value, to, number, what);
       return;
     }
@@ -184,7 +172,7 @@ class Writer {
       first_field(row, value, to, number, what);
       return;
     }
-    if (!is_sequence || PySequence_Size(value.ptr()) != static_cast<Py_ssize_t>(row.fields)) {
+    if (!is_sequence_of(value, row.fields)) {
       refuse(what,
              "a number (its first field), a mapping, a record, or all its fields in order (" +
                  fields_of(schema_, row) + ")",
@@ -262,8 +250,7 @@ class Writer {
   }
 
   static void expect_length(nb::handle value, std::uint32_t length, const std::string& what) {
-    const bool is_sequence = PySequence_Check(value.ptr()) != 0 && !PyUnicode_Check(value.ptr());
-    if (!is_sequence || PySequence_Size(value.ptr()) != static_cast<Py_ssize_t>(length)) {
+    if (!is_sequence_of(value, length)) {
       refuse(what, "a sequence of " + std::to_string(length), value);
     }
   }
@@ -314,4 +301,11 @@ StateBytes::StateBytes(const Schema& schema, std::uint32_t type, nb::handle valu
                        const std::string& owner, Missing missing)
     : bytes(schema.types[type].size), mask(o80::mask_words(schema.scalar_count(type))) {
   Writer(schema, *this, missing).write(type, value, bytes.data(), 0, owner);
+}
+
+std::vector<std::byte> request_bytes(const Schema& schema, std::uint32_t request,
+                                     nb::handle fields) {
+  const o80::RequestRow& row = schema.requests[request];
+  const std::string owner = "request '" + row.name.str() + "'";
+  return StateBytes(schema, row.type, fields, owner, Missing::by_default).bytes;
 }

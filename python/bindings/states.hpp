@@ -29,3 +29,7 @@ struct StateBytes {
   StateBytes(const o80::Schema& schema, std::uint32_t type, nb::handle value,
              const std::string& owner, Missing missing = Missing::kept);
 };
+
+/// The fields of a request. Those that are left out get their default.
+std::vector<std::byte> request_bytes(const o80::Schema& schema, std::uint32_t request,
+                                     nb::handle fields);

@@ -13,8 +13,7 @@ struct Verb {
   PyObject_HEAD vectorcallfunc call;
   PyObject* native;
   vectorcallfunc call_native;
-  const char* name;
-  const VerbText* text;
+  VerbText text;
 };
 
 Verb* verb_of(PyObject* self) { return reinterpret_cast<Verb*>(self); }
@@ -33,7 +32,7 @@ void explain(const Verb& verb, PyObject* const* arguments, Py_ssize_t count, PyO
       keywords[nb::handle(PyTuple_GET_ITEM(names, i))] = nb::handle(arguments[count + i]);
     }
     const nb::object refuse = nb::module_::import_("o80.base.signatures").attr("refuse");
-    refuse(verb.text->signature, nb::handle(arguments[0]), given, keywords, error.value());
+    refuse(verb.text.signature, nb::handle(arguments[0]), given, keywords, error.value());
     error.restore();
   } catch (nb::python_error& refused) {
     refused.restore();
@@ -56,7 +55,7 @@ PyObject* bind_verb(PyObject* self, PyObject* object, PyObject* /*type*/) {
 }
 
 PyObject* repr_of_verb(PyObject* self) {
-  return PyUnicode_FromFormat("<method '%s' of 'o80.Frontend'>", verb_of(self)->name);
+  return PyUnicode_FromFormat("<method '%s' of 'o80.Frontend'>", verb_of(self)->text.name);
 }
 
 void free_verb(PyObject* self) {
@@ -66,22 +65,10 @@ void free_verb(PyObject* self) {
   Py_DECREF(type);
 }
 
-PyObject* name_of_verb(PyObject* self, void* /*unused*/) {
-  return PyUnicode_FromString(verb_of(self)->name);
-}
-
-PyObject* qualified_name_of_verb(PyObject* self, void* /*unused*/) {
-  return PyUnicode_FromFormat("Frontend.%s", verb_of(self)->name);
-}
-
-PyObject* help_of_verb(PyObject* self, void* /*unused*/) {
-  return PyUnicode_FromString(verb_of(self)->text->help);
-}
-
 PyObject* signature_of_verb(PyObject* self, void* /*unused*/) {
   try {
     const nb::object signature = nb::module_::import_("o80.base.signatures").attr("signature_of");
-    return signature(verb_of(self)->text->signature).release().ptr();
+    return signature(verb_of(self)->text.signature).release().ptr();
   } catch (nb::python_error& error) {
     error.restore();
     return nullptr;
@@ -90,14 +77,13 @@ PyObject* signature_of_verb(PyObject* self, void* /*unused*/) {
 
 PyMemberDef members_of_verb[] = {
     {"__vectorcalloffset__", T_PYSSIZET, offsetof(Verb, call), READONLY, nullptr},
+    {"__name__", T_STRING, offsetof(Verb, text.name), READONLY, nullptr},
+    {"__qualname__", T_STRING, offsetof(Verb, text.qualified_name), READONLY, nullptr},
+    {"__doc__", T_STRING, offsetof(Verb, text.help), READONLY, nullptr},
     {nullptr, 0, 0, 0, nullptr}};
 
-PyGetSetDef attributes_of_verb[] = {
-    {"__name__", name_of_verb, nullptr, nullptr, nullptr},
-    {"__qualname__", qualified_name_of_verb, nullptr, nullptr, nullptr},
-    {"__doc__", help_of_verb, nullptr, nullptr, nullptr},
-    {"__signature__", signature_of_verb, nullptr, nullptr, nullptr},
-    {nullptr, nullptr, nullptr, nullptr, nullptr}};
+PyGetSetDef attributes_of_verb[] = {{"__signature__", signature_of_verb, nullptr, nullptr, nullptr},
+                                    {nullptr, nullptr, nullptr, nullptr, nullptr}};
 
 PyType_Slot slots_of_verb[] = {{Py_tp_call, reinterpret_cast<void*>(&PyVectorcall_Call)},
                                {Py_tp_descr_get, reinterpret_cast<void*>(&bind_verb)},
@@ -114,17 +100,16 @@ PyType_Spec spec_of_verb = {"o80._core.Verb", sizeof(Verb), 0,
 
 }  // namespace
 
-void make_verb(nb::class_<Frontend>& frontend, const char* name, const VerbText& text) {
+void make_verb(nb::class_<Frontend>& frontend, const VerbText& text) {
   static PyObject* const type = PyType_FromSpec(&spec_of_verb);
   if (type == nullptr) throw nb::python_error();
-  nb::object native = frontend.attr(name);
+  nb::object native = frontend.attr(text.name);
   const nb::object verb = nb::steal(PyType_GenericAlloc(reinterpret_cast<PyTypeObject*>(type), 0));
   if (!verb.is_valid()) throw nb::python_error();
   Verb& made = *verb_of(verb.ptr());
   made.call = &call_verb;
   made.call_native = PyVectorcall_Function(native.ptr());
   made.native = native.release().ptr();
-  made.name = name;
-  made.text = &text;
-  nb::setattr(frontend, name, verb);
+  made.text = text;
+  nb::setattr(frontend, text.name, verb);
 }

@@ -35,11 +35,11 @@ def main() -> None:
     header, *sources = map(Path, sys.argv[1:])
     verbs = [verb for source in sources for verb in declared(source.read_text())]
     text = "// Made by verbs.py from the classes in python/o80/frontend.\n#pragma once\n\n"
-    text += "struct VerbText {\n  const char* signature;\n  const char* help;\n};\n\n"
+    text += "struct VerbText {\n  const char *name, *qualified_name, *signature, *help;\n};\n\n"
     text += "namespace verbs {\n"
     for name, signature, help_text in verbs:
-        text += f'inline constexpr VerbText {name}{{R"o80({signature})o80",\n'
-        text += f'R"o80({help_text})o80"}};\n'
+        text += f'inline constexpr VerbText {name}{{"{name}", "Frontend.{name}",\n'
+        text += f'R"o80({signature})o80",\nR"o80({help_text})o80"}};\n'
     text += "}  // namespace verbs\n"
     if not header.exists() or header.read_text() != text:
         header.write_text(text)

@@ -48,3 +48,21 @@ auto without_gil(Work&& work) {
 
 /// Converts seconds; None is for ever. Throws InvalidArgument.
 o80::Timeout timeout_of(nb::handle seconds);
+
+/// An argument `timeout`, in seconds: whoever calls the function gets InvalidArgument for others.
+struct Patience {
+  operator o80::Timeout() const { return timeout; }  // NOLINT(google-explicit-constructor)
+  o80::Timeout timeout;
+};
+template <>
+struct nanobind::detail::type_caster<Patience> {
+  template <class>
+  using Cast = Patience;
+  static constexpr auto Name = const_name("float | None");
+  bool from_python(handle source, std::uint32_t, cleanup_list*) noexcept {
+    given = source;
+    return true;
+  }
+  explicit operator Patience() const { return {timeout_of(given)}; }
+  handle given;
+};

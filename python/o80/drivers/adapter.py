@@ -10,10 +10,10 @@ import numpy as np
 import o80._core as _core
 from o80.base.argument_checks import nothing
 from o80.base.descriptors import above_standard
-from o80.base.errors import Error, InvalidArgument, RequestRejected, exception_text
-from o80.drivers.backend import KEEPS
+from o80.base.errors import Error, InvalidArgument, exception_text
+from o80.drivers.backend import KEEPS, Answer
 from o80.drivers.description import SchemaWriter
-from o80.drivers.reading import Answer, Desired, Differences, DriverFaultError, Reading
+from o80.drivers.reading import Desired, Differences, DriverFaultError, Reading
 from o80.rows.layout import Layout, dtype_of_type, request_fields
 
 NANOSECOND = 1e-9
@@ -134,20 +134,13 @@ class Adapter:
         row = self._requests[index]
         fields = request_fields(row["type"], bytearray(payload))
         handler = getattr(self._driver, f"on_{row['name']}")
-        try:
-            return Answer.of(handler(fields), f"on_{row['name']}")
-        except RequestRejected as why:
-            return Answer.REJECTED, str(why) or "the handler gave no reason"
+        return Answer.of(lambda: handler(fields), f"on_{row['name']}")
 
     def halt(self) -> None:
         nothing(self._driver.halt(), "halt()")
 
     def resume(self) -> tuple[int, str]:
-        try:
-            nothing(self._driver.resume(), "resume()", KEEPS)
-        except RequestRejected as why:
-            return Answer.REJECTED, str(why) or "resume() gave no reason"
-        return Answer.DONE, ""
+        return Answer.of(lambda: nothing(self._driver.resume(), "resume()", KEEPS), "resume()")
 
     def stop(self) -> None:
         if verb := self._given("stop"):

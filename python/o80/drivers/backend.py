@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import o80._core as _core
 from o80.base import argument_checks, lifecycle
 from o80.base.argument_checks import nothing
-from o80.base.errors import Closed, InvalidArgument, RequestRejected, exception_text
+from o80.base.errors import InvalidArgument, RequestRejected, exception_text
 from o80.base.loop_options import loop_texts, names_of
 from o80.base.words import IdleWord, StaleWord
 from o80.drivers.description import Described, Limit, SchemaWriter, numbered
@@ -61,6 +61,38 @@ def check_end(answer: StartAfresh | None, rejected: str | None) -> None:
 
 
 KEEPS = ", or raise o80.RequestRejected to keep the halt"
+
+
+class Answer:
+    """Results of a request, with the numbers of the compiled loop."""
+
+    DONE = 0
+    REJECTED = 1
+    START_AFRESH = 2
+    FAILED = 3
+    RUNNING = 4
+
+    @staticmethod
+    def of(handler: Callable[[], Any], what: str) -> tuple[int, str]:
+        """Calls a handler and converts its answer to number and text.
+
+        Raises InvalidArgument for other answers.
+        """
+        try:
+            answer = handler()
+        except RequestRejected as why:
+            return Answer.REJECTED, str(why) or f"{what} gave no reason"
+        if answer is None:
+            return Answer.DONE, ""
+        if isinstance(answer, Running):
+            return Answer.RUNNING, answer.progress
+        if isinstance(answer, StartAfresh):
+            return Answer.START_AFRESH, ""
+        raise InvalidArgument(
+            f"{what} must return None, o80.StartAfresh(...) or o80.Running(...), or raise "
+            f"o80.RequestRejected; got {answer!r}"
+        )
+
 
 Handler = Callable[[Record], StartAfresh | Running | None]
 
@@ -139,7 +171,6 @@ class Backend(lifecycle.Managed):
         given = locals()
         loop = loop_texts(given, names_of("backend"))
         writer = SchemaWriter.of(robot or segment, given.get)
-        self._native: _core.Backend | None = None
         native = _core.Backend(writer.builder, segment, loop)
         self._layout = Layout(native.description)
         self._segment = segment
@@ -152,12 +183,6 @@ class Backend(lifecycle.Managed):
         native.serve_with = Server(self)
         self._native = native
         lifecycle.close_later(self)
-
-    @property
-    def _open(self) -> _core.Backend:
-        if self._native is None:
-            raise Closed(f"the backend of '{self._segment}' was closed: make a new one")
-        return self._native
 
     # ------------------------------------------------------------------ publish and step
 
@@ -173,12 +198,12 @@ class Backend(lifecycle.Managed):
         robot cannot have moved from row 0 to the next reading: one of the two is wrong, and the
         backend ends.
         """
-        native = self._open
+        self._native.check()
         if observed is not None:
             fill(self._observed, observed, "observed")
         if extended is not None:
             fill(self._extended, extended, "extended")
-        native.publish()
+        self._native.publish()
 
     def step(self, timeout: float | None = None) -> Any:
         """Begins an iteration and returns its desired states, a new array or record; None after
@@ -189,13 +214,12 @@ class Backend(lifecycle.Managed):
         RequestRejected) or returns a StartAfresh with NaN or infinite numbers, `step` raises that
         exception or InvalidArgument: then close the backend.
         """
-        native = self._open
         if self._fresh_start is not None:
             fresh, self._fresh_start = self._fresh_start, None
             read_afresh(fresh, self._observed, self._extended, self._fresh_desired)
-        if not native.step(timeout):
+        if not self._native.step(timeout):
             return None
-        return self._layout.of_states(self._layout.states_in(native.desired()))
+        return self._layout.of_states(self._layout.states_in(self._native.desired()))
 
     # ------------------------------------------------------------------ requests and halts
 
@@ -206,7 +230,7 @@ class Backend(lifecycle.Managed):
         time. It raises RequestRejected to reject the request; the sender reads the text.
         """
         index = self._index_of(request)
-        self._open.check()
+        self._native.check()
         self._handlers[self._layout.schema["requests"][index]["name"]] = handler
 
     def running(self, request: str) -> bool:
@@ -214,11 +238,11 @@ class Backend(lifecycle.Managed):
 
         A halt ends it, unless it is in `while_halted`: the program must then stop the motion.
         """
-        return self._open.runs(self._index_of(request))
+        return self._native.runs(self._index_of(request))
 
     def progress(self, request: str, text: str) -> None:
         """Sets the text that frontends get while a request runs: at most 247 bytes."""
-        self._open.show_progress(self._index_of(request), argument_checks.text(text, "progress"))
+        self._native.show_progress(self._index_of(request), argument_checks.text(text, "progress"))
 
     def end_request(
         self, request: str, answer: StartAfresh | None = None, *, rejected: str | None = None
@@ -233,10 +257,10 @@ class Backend(lifecycle.Managed):
         """
         index = self._index_of(request)
         check_end(answer, rejected)
-        if not self._open.runs(index):
+        if not self._native.runs(index):
             return
         self._fresh_start = answer or self._fresh_start
-        self._open.end_request(index, answer is not None, rejected)
+        self._native.end_request(index, answer is not None, rejected)
 
     def _index_of(self, request: str) -> int:
         return numbered(
@@ -245,7 +269,7 @@ class Backend(lifecycle.Managed):
 
     def on_halt(self, handler: Callable[[], None]) -> None:
         """Sets a function to call when a halt begins: commands have ended, desired states brake."""
-        self._open.check()
+        self._native.check()
         self._halt_handlers["halt"] = handler
 
     def on_resume(self, handler: Callable[[], None]) -> None:
@@ -253,7 +277,7 @@ class Backend(lifecycle.Managed):
 
         Desired states then continue from the last observed states.
         """
-        self._open.check()
+        self._native.check()
         self._halt_handlers["resume"] = handler
 
     def halt(self, reason: str = "") -> None:
@@ -262,28 +286,25 @@ class Backend(lifecycle.Managed):
         The halt is in force from the next `step` on. May be called from any thread. A call with the
         same reason belongs to the same halt; another reason is another halt.
         """
-        self._open.halt(reason)
+        self._native.halt(reason)
         argument_checks.text(reason, "the reason of a halt")
 
     def interrupt(self, actuator: int | str) -> None:
         """Ends the commands of an actuator as interrupted, in the current iteration."""
         names = [row["name"] for row in self._layout.schema["actuators"]]
-        self._open.interrupt(numbered(actuator, names, "actuator"))
+        self._native.interrupt(numbered(actuator, names, "actuator"))
 
     def stop(self) -> None:
         """Makes `step` return None. May be called from any thread."""
-        self._open.ask_to_stop()
+        self._native.ask_to_stop()
 
     def close(self, failure: str | None = None) -> None:
         """Ends the backend, as failed if `failure` is given: frontends raise it with this text.
 
         A `step` that waits in another thread raises Closed.
         """
-        native, self._native = self._native, None
-        if native is None:
-            return
-        text = native.failure if failure is None else failure
-        native.end(bool(text), text)
+        text = self._native.failure if failure is None else failure
+        self._native.end(bool(text), text)
         self._handlers.clear()
         self._halt_handlers.clear()
 
@@ -299,17 +320,17 @@ class Backend(lifecycle.Managed):
     @property
     def active(self) -> NDArray[np.bool_]:
         """True where a command or braking gives the desired state: bool (actuators,)."""
-        return self._layout.mask_in(np.frombuffer(self._open.active(), np.uint8))
+        return self._layout.mask_in(np.frombuffer(self._native.active(), np.uint8))
 
     @property
     def iteration(self) -> int:
         """The current iteration."""
-        return self._open.iteration
+        return self._native.iteration
 
     @property
     def time(self) -> int:
         """Time of the current iteration [ns]: monotonic clock, or simulated in bursting mode."""
-        return self._open.time
+        return self._native.time
 
     @property
     def segment(self) -> str:
@@ -325,7 +346,7 @@ class Backend(lifecycle.Managed):
         self.close(exception_text(error) if isinstance(error, Exception) else None)
 
     def __repr__(self) -> str:
-        return f"<o80.Backend of '{self._segment}'{', closed' if self._native is None else ''}>"
+        return f"<o80.Backend of '{self._segment}'{', closed' if self._native.closed else ''}>"
 
 
 class Server:
@@ -339,48 +360,37 @@ class Server:
         self._extended = backend._extended
         self._desired = backend._fresh_desired
 
-    def __call__(self, index: int, payload: bytes) -> str | bool | tuple[str] | None:
-        """Returns None (done), a text (rejected), (text,) (running) or True (start afresh)."""
+    def __call__(self, index: int, payload: bytes) -> tuple[int, str]:
         row = self._rows[index]
         handler = self._handlers.get(row["name"])
         if handler is None:
-            return (
+            return Answer.REJECTED, (
                 f"request '{row['name']}' has no handler: the backend's program must call "
                 f"Backend.on({row['name']!r}, handler)"
             )
-        fields = np.frombuffer(bytearray(payload), np.uint8)
-        try:
-            answer = handler(request_fields(row["type"], fields))
-        except RequestRejected as why:
-            return str(why) or "the handler gave no reason"
-        if answer is None:
-            return None
-        if isinstance(answer, Running):
-            return (answer.progress,)
-        if not isinstance(answer, StartAfresh):
-            raise InvalidArgument(
-                f"the handler of '{row['name']}' must return None, o80.StartAfresh(...) or "
-                f"o80.Running(...), or raise o80.RequestRejected; got {answer!r}"
-            )
-        read_afresh(answer, self._observed, self._extended, self._desired)
-        return True
 
-    def halt(self) -> None:
+        def answer() -> StartAfresh | Running | None:
+            given = handler(request_fields(row["type"], bytearray(payload)))
+            if isinstance(given, StartAfresh):
+                read_afresh(given, self._observed, self._extended, self._desired)
+            return given
+
+        return Answer.of(answer, f"the handler of '{row['name']}'")
+
+    def halt(self) -> tuple[int, str]:
         """Calls the handler of on_halt, when a halt begins."""
         if handler := self._halt_handlers.get("halt"):
             nothing(handler(), "the handler of on_halt")
+        return Answer.DONE, ""
 
-    def resume(self) -> str | None:
-        """Calls the handler of on_resume; returns its reason to keep the halt, or None."""
+    def resume(self) -> tuple[int, str]:
+        """Calls the handler of on_resume."""
         self._desired[...] = self._observed
         handler = self._halt_handlers.get("resume")
         if handler is None:
-            return None
-        try:
-            nothing(handler(), "the handler of on_resume", KEEPS)
-        except RequestRejected as why:
-            return str(why) or "the handler gave no reason"
-        return None
+            return Answer.DONE, ""
+        what = "the handler of on_resume"
+        return Answer.of(lambda: nothing(handler(), what, KEEPS), what)
 
 
 def read_afresh(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 import o80._core as _core
 from o80.base import argument_checks
 from o80.base.errors import InvalidArgument
-from o80.drivers.backend import Running, StartAfresh, check_end, fill
+from o80.drivers.backend import Answer, StartAfresh, check_end, fill
 from o80.drivers.description import numbered
 from o80.rows.layout import Layout
 
@@ -200,27 +200,3 @@ class Reading:
             self._follows,
         )
         return None if report == (False, False, False, None, [], [], False) else report
-
-
-class Answer:
-    """Results of a request, with the numbers of the compiled loop."""
-
-    DONE = 0
-    REJECTED = 1
-    START_AFRESH = 2
-    FAILED = 3
-    RUNNING = 4
-
-    @staticmethod
-    def of(answer: Any, what: str) -> tuple[int, str]:
-        """Converts a handler's answer to number and text. Raises InvalidArgument for others."""
-        if answer is None:
-            return Answer.DONE, ""
-        if isinstance(answer, Running):
-            return Answer.RUNNING, answer.progress
-        if isinstance(answer, StartAfresh):
-            return Answer.START_AFRESH, ""
-        raise InvalidArgument(
-            f"{what} must return None, o80.StartAfresh() or o80.Running(...), or raise "
-            f"o80.RequestRejected; got {answer!r}"
-        )

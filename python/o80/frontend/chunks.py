@@ -207,7 +207,7 @@ class Chunks(Managed):
             ease = 1 if self.profile == "hold" else self.ease
             batch = self._arm._send_chunk(
                 self._actuators,
-                after.astype(np.uint32).view(np.uint8),
+                after.astype(np.uint32),
                 states,
                 masks,
                 anchor,

@@ -222,7 +222,7 @@ class Commander(Reader):
             iterations = 1
         chosen, _ = self._chosen(actuators)
         states, rows, masks = states_of(targets, chosen, self._layout)
-        ends = None if times is None else times_of(times)
+        ends = b"" if times is None else times_of(times)
         options = _core.CommandOptions(
             speed=speed,
             iterations=iterations,
@@ -232,22 +232,6 @@ class Commander(Reader):
             of_rows=True,
         )
         return self._add_trajectories(chosen, rows, states, masks, ends, options, clip)
-
-    def _chosen(self, actuators: int | str | Sequence[int | str] | None) -> tuple[list[int], bool]:
-        """Returns indices of the actuators; True if a single one was named without a list."""
-        if actuators is None:
-            return list(range(len(self.actuators))), False
-        if isinstance(actuators, (int, str, np.integer)):
-            of_group = self._group(actuators)
-            return (of_group, False) if of_group else ([self._index(actuators)], True)
-        chosen = (self._group(each) or [self._index(each)] for each in actuators)
-        return [index for each in chosen for index in each], False
-
-    def _group(self, named: int | str) -> list[int]:
-        """Returns the actuators of a group; none for other names, and for names of actuators."""
-        if not isinstance(named, str) or any(each.name == named for each in self.actuators):
-            return []
-        return [each.index for each in self.actuators if each.group == named]
 
     def request(
         self,

@@ -308,8 +308,10 @@ class Layout:
     observed = partialmethod(_states, "observed")
 
     def way_to(self, part: str) -> Any:
-        """Shape, dtype and offset of states that are a plain array; else the method for them."""
-        if self._is_plain_array:
+        """Shape, dtype and offset of a part that is a plain array; else the method for it."""
+        if part == "off_plan":
+            return (self.actuators,), np.dtype(np.float32), self._at[part]
+        if part in ("desired", "observed") and self._is_plain_array:
             return self._shape, self._element, self._at[part]
         return getattr(self, part)
 
@@ -328,9 +330,6 @@ class Layout:
     clamped = partialmethod(_mask, "clamped")
     braking = partialmethod(_mask, "braking")
     starved = partialmethod(_mask, "starved")
-
-    def off_plan(self, row: Any) -> NDArray[np.float32]:
-        return np.ndarray((self.actuators,), np.float32, row, self._at["off_plan"])
 
     def flat(self, row: Any, dtype: Any = None) -> NDArray[Any]:
         kind = np.dtype(np.float32 if dtype is None else dtype)

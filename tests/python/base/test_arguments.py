@@ -46,7 +46,7 @@ import o80
         (lambda arm: arm.add_command(0, 0.1, mode="replace"), "'overwrite', got 'replace'"),
         (lambda arm: arm.add_command(0, 0.1, profile="smooth"), "'as_sent', got 'smooth'"),
         (lambda arm: arm.add_command(0, 0.1, start="here"), "'observed', got 'here'"),
-        (lambda arm: arm.add_command(0, 0.1, start=None), "start must be one of .*, got None"),
+        (lambda arm: arm.add_command(0, 0.1, start=None), "start must be 'desired' or .* got None"),
         (lambda arm: arm.add_command(0, 0.1, every=0), "every must be positive, got 0"),
         (lambda arm: arm.add_command(0, 0.1, every=True), "every .* got True"),
         (lambda arm: arm.add_command(0, 0.1, fastest=1), "fastest must be True or False, got 1"),
