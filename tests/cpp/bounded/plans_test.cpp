@@ -8,11 +8,11 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
-#include <random>
 #include <vector>
 
 #include "bounded/counted_work.hpp"
 #include "control/motion/number_motion.hpp"
+#include "dice.hpp"
 
 namespace o80::test {
 namespace {
@@ -34,40 +34,36 @@ constexpr std::uint32_t kSmooth = (8 + 32) * (2 + 2 * 10);
 
 class PlansTest : public testing::Test {
  protected:
-  double real(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random_);
-  }
-  double magnitude(double low, double high) { return std::pow(10.0, real(low, high)); }
-  bool one_in(int count) { return real(0.0, count) < 1.0; }
-
   NumberMotion number_at(double position, double bound, const Rates& rates) {
     NumberMotion number(NumberLimiter(-bound, bound, rates), std::nullopt);
     number.restart(position);
     return number;
   }
   NumberMotion any_number() {
-    Rates rates{magnitude(-5, 1), kNoLimit, kNoLimit};
-    if (!one_in(8)) rates.acceleration = rates.speed * magnitude(-4, 1);
-    if (!one_in(4)) rates.jerk = rates.acceleration * magnitude(-4, 1);
-    const double bound = one_in(3) ? magnitude(-2, 2) : kNoLimit;
-    return number_at(real(-1, 1) * std::min(bound, 1.0), bound, rates);
+    Rates rates{dice_.magnitude(1e-5, 10), kNoLimit, kNoLimit};
+    if (!dice_.one_in(8)) rates.acceleration = rates.speed * dice_.magnitude(1e-4, 10);
+    if (!dice_.one_in(4)) rates.jerk = rates.acceleration * dice_.magnitude(1e-4, 10);
+    const double bound = dice_.one_in(3) ? dice_.magnitude(1e-2, 100) : kNoLimit;
+    return number_at(dice_.real(-1, 1) * std::min(bound, 1.0), bound, rates);
   }
   Requested any_target(const NumberMotion& number) {
-    const double far = one_in(20) ? magnitude(4, 300) : magnitude(-8, 3);
-    const double near = number.guard().moment().speed * real(0, 20);  // about where it can stop
+    const double far = dice_.one_in(20) ? dice_.magnitude(1e4, 1e300) : dice_.magnitude(1e-8, 1e3);
+    const double near =
+        number.guard().moment().speed * dice_.real(0, 20);  // about where it can stop
     Requested requested;
-    requested.target = number.position() + (one_in(4) ? near : real(-1, 1) * far);
-    if (one_in(3)) requested.profile = Profile::minimum_jerk;
-    if (one_in(3)) requested.cruise = number.guard().rates().speed * magnitude(-3, 0.2);
-    if (one_in(3)) requested.iterations = static_cast<std::int64_t>(magnitude(0, 9));
-    if (one_in(10)) requested.start = real(-1, 1);
+    requested.target = number.position() + (dice_.one_in(4) ? near : dice_.real(-1, 1) * far);
+    if (dice_.one_in(3)) requested.profile = Profile::minimum_jerk;
+    if (dice_.one_in(3))
+      requested.cruise = number.guard().rates().speed * dice_.magnitude(1e-3, 1.6);
+    if (dice_.one_in(3)) requested.iterations = static_cast<std::int64_t>(dice_.magnitude(1, 1e9));
+    if (dice_.one_in(10)) requested.start = dice_.real(-1, 1);
     return requested;
   }
   std::int64_t some_of(std::int64_t iterations) {
-    return static_cast<std::int64_t>(real(0, 1) * static_cast<double>(iterations));
+    return static_cast<std::int64_t>(dice_.real(0, 1) * static_cast<double>(iterations));
   }
 
-  std::mt19937_64 random_{11};
+  Dice dice_{11};
 };
 
 void expect_bounded(const CountedWork& work, std::uint32_t speed_changes) {
@@ -87,7 +83,7 @@ TEST_F(PlansTest, AreBoundedFromAnyMotionWithinAnyLimits) {
       expect_bounded(work_since_last_asked(), kStart);
       if (iterations > kLongestPlan) break;
       // often another number of the state needs more
-      if (one_in(2)) iterations += static_cast<std::int64_t>(magnitude(0, 3));
+      if (dice_.one_in(2)) iterations += static_cast<std::int64_t>(dice_.magnitude(1, 1e3));
       number.settle(iterations);
       expect_bounded(work_since_last_asked(), kStart + kStretch);
 
@@ -95,7 +91,7 @@ TEST_F(PlansTest, AreBoundedFromAnyMotionWithinAnyLimits) {
         number.step(-kNoLimit, kNoLimit);
         expect_bounded(work_since_last_asked(), number.follows() ? kFollow : 0);
       }
-      if (!one_in(4)) continue;
+      if (!dice_.one_in(4)) continue;
       number.end();
       for (int i = 0; i < 10; ++i) number.brake();
       expect_bounded(work_since_last_asked(), 10 * kFollow);
@@ -123,7 +119,7 @@ TEST_F(PlansTest, OfAnArmUsuallyNeedFewChangesOfSpeed) {
     NumberMotion number = number_at(0.0, kNoLimit, arm);
     const auto start = [&](std::int64_t more) {
       Requested requested;
-      requested.target = number.position() + real(-1, 1);
+      requested.target = number.position() + dice_.real(-1, 1);
       work_since_last_asked();
       number.begin();
       const std::int64_t iterations = number.propose(requested) + more;

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <vector>
 
 #include "control/rig.hpp"
+#include "dice.hpp"
 
 namespace o80::test {
 
@@ -100,29 +100,27 @@ class ChunkScript {
     Iteration at = 1;
     while (at < last) {
       rig.run_to(at);
-      const auto pick = [&](int low, int high) {
-        return std::uniform_int_distribution<int>(low, high)(dice_);
-      };
-      if (pick(0, 9) == 0) {
+      if (dice_.one_in(10)) {
         rig.batch.purge(kEveryActuator);
         rig.pulse();
       }
       Sent sent;
-      sent.anchor = std::max<Iteration>(0, at - pick(-5, 40));
-      const int rows = pick(1, 40);
-      const double step = pick(0, 2) == 0 ? 50.0 / 3.0 : pick(1, 25);
+      sent.anchor = std::max<Iteration>(0, at - dice_.whole(-5, 40));
+      const std::int64_t rows = dice_.whole(1, 40);
+      const double step = dice_.one_in(3) ? 50.0 / 3.0 : static_cast<double>(dice_.whole(1, 25));
       for (int i = 1; i <= rows; ++i) {
-        sent.due.push_back(static_cast<std::uint32_t>(std::floor(i * step + 0.5)));
+        sent.due.push_back(
+            static_cast<std::uint32_t>(std::floor(static_cast<double>(i) * step + 0.5)));
       }
       double value = rig.desired();
       for (int i = 0; i < rows; ++i) {
-        value += std::uniform_real_distribution<double>(-0.1, 0.1)(dice_);
+        value += dice_.real(-0.1, 0.1);
         sent.rows.push_back(value);
       }
       sent.head.anchor = sent.anchor;
-      sent.head.ease = static_cast<std::uint32_t>(pick(1, 25));
-      sent.head.first = static_cast<std::uint32_t>(std::min(pick(0, 6), rows - 1));
-      sent.head.fixed = static_cast<std::uint8_t>(pick(0, 3) == 0);
+      sent.head.ease = static_cast<std::uint32_t>(dice_.whole(1, 25));
+      sent.head.first = static_cast<std::uint32_t>(std::min(dice_.whole(0, 6), rows - 1));
+      sent.head.fixed = static_cast<std::uint8_t>(dice_.one_in(4));
       sent.taken = at;
       for (std::size_t i = 0; i < sent.rows.size() && odd_ != 0.0; ++i) {
         // rows that cannot be reached any more
@@ -130,7 +128,7 @@ class ChunkScript {
       }
       sent.id = rig.chunk(sent.rows, sent.due, sent.head);
       all.push_back(sent);
-      at += pick(1, 60);
+      at += dice_.whole(1, 60);
     }
     rig.run_to(last + 1200);
     return rig.rows;
@@ -138,7 +136,7 @@ class ChunkScript {
   std::vector<Sent> all;
 
  private:
-  std::mt19937 dice_;
+  Dice dice_;
   double odd_;
 };
 

@@ -30,6 +30,11 @@ inline AttachedSegment attach(const std::string& name = "arm", Access access = A
   return AttachedSegment::attach(name, access, patient());
 }
 
+/// Also to the segment of one that has ended.
+inline AttachedSegment attach_dead(Access access = Access::read_only) {
+  return AttachedSegment::attach("arm", access, soon(), {.dead = true});
+}
+
 /// A test with its own directory of segments.
 class SegmentTest : public ::testing::Test {
  protected:

@@ -309,7 +309,10 @@ class Trace {
     const std::size_t dot = words_[0].find('.');
     const std::size_t place = dot == std::string::npos ? 0 : std::stoul(words_[0].substr(dot + 1));
     const Handle handle = place < batch.size() ? batch.handle(place) : Handle{};
-    const auto wait = [&] { batch.wait(kAtOnce); };
+    const auto burst = bursts_.find(words_[0]);
+    const auto wait = [&] {
+      burst == bursts_.end() ? batch.wait(kAtOnce) : static_cast<void>(burst->second.wait(kAtOnce));
+    };
     if (verb == "taken") {
       EXPECT_EQ(batch.first_iteration(), whole(2));
     } else if (verb == "ended") {
@@ -317,9 +320,9 @@ class Trace {
     } else if (verb == "open") {
       EXPECT_FALSE(batch.ended());
     } else if (verb == "done") {
-      EXPECT_EQ(bursts_.at(words_[0]).wait_done(kAtOnce), whole(2));
+      EXPECT_EQ(burst->second.wait_done(kAtOnce), whole(2));
     } else if (verb == "undone") {
-      EXPECT_FALSE(bursts_.at(words_[0]).done());
+      EXPECT_FALSE(burst->second.done());
     } else if (verb == "says") {
       EXPECT_THAT(handle.text, HasSubstr(rest()));
     } else if (verb == "shows") {

@@ -90,11 +90,7 @@ void Arena::begin(std::uint64_t seed, const std::string& replay) {
 }
 
 void Arena::begin_phase(Phase phase, std::int64_t now) {
-  const auto former =
-      static_cast<std::size_t>(round_->phase.exchange(static_cast<std::uint32_t>(phase)));
-  if (phase != Phase::act)
-    tally_.longest_phase[former] = std::max(tally_.longest_phase[former], now - phase_began_);
-  phase_began_ = now;
+  round_->phase = static_cast<std::uint32_t>(phase);
   phase_ends_ =
       phase == Phase::act ? now + chance_.between(1500, 3000) * kMillisecond : now + kPatience;
 }

@@ -28,7 +28,6 @@ struct Tally {
   std::uint64_t rows = 0;
   std::uint64_t commands = 0;
   HaltCount halts;
-  std::array<std::int64_t, 4> longest_phase{};  // [ns]
   std::vector<std::int64_t> noticed;
   std::vector<std::int64_t> recovered;
 };
@@ -98,7 +97,6 @@ class Arena {
   std::map<pid_t, Running> running_;
   std::vector<Slot*> expected_;  // ordered from the nursery
   std::vector<Start> to_start_;
-  std::int64_t phase_began_ = 0;
   std::int64_t phase_ends_ = 0;
   std::int64_t worked_ = 0;
   std::uint64_t progress_ = 0;

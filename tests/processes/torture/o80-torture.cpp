@@ -154,10 +154,6 @@ class Campaign {
         number(halts.requested), number(halts.controlled), number(halts.interrupted),
         number(halts.begun), number(halts.moving), number(halts.commands), number(halts.bursts),
         number(halts.resumed), number(halts.inherited));
-    std::printf("longest phase of a round: act %.1f s, settle %.1f s, audit %.1f s\n",
-                static_cast<double>(tally_.longest_phase[0]) / 1e9,
-                static_cast<double>(tally_.longest_phase[1]) / 1e9,
-                static_cast<double>(tally_.longest_phase[2]) / 1e9);
     print_times("kill => a waiting frontend raises", tally_.noticed);
     print_times("kill => first row of the next one is seen", tally_.recovered);
     for (std::uint32_t i = 1; i < static_cast<std::uint32_t>(Fault::count); ++i) {

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 
 #include "control/motion/number_limiter.hpp"
 #include "control/motion/number_plan.hpp"
+#include "dice.hpp"
 
 namespace o80 {
 namespace {
@@ -60,16 +60,13 @@ TEST(FastestMotionTest, LetsGoOfTheBrakeForATargetJustBeyondTheWayToRest) {
 /// Motions that are cut, and go on to a target near the end of their stop or near their own target:
 /// the last step, to the exact target, keeps the limits as all others do.
 TEST(FastestMotionTest, FromAnyMotionEachStepKeepsTheLimits) {
-  std::mt19937_64 dice(1);
-  const auto draw = [&](double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(dice);
-  };
+  test::Dice dice(1);
   for (int seed = 0; seed < 20'000; ++seed) {
     Rates rates;
-    rates.speed = std::exp(draw(-7, -1));
-    rates.acceleration = rates.speed * std::exp(draw(-5, -0.3));
-    rates.jerk = rates.acceleration * std::exp(draw(-3, 1));
-    const double first = draw(-1, 1) * std::exp(draw(-3, 4)) * rates.speed * 20;
+    rates.speed = dice.magnitude(1e-3, 0.4);
+    rates.acceleration = rates.speed * dice.magnitude(0.007, 0.7);
+    rates.jerk = rates.acceleration * dice.magnitude(0.05, 3);
+    const double first = dice.real(-1, 1) * dice.magnitude(0.05, 50) * rates.speed * 20;
     FastestMotion before({}, first, rates);
     Moment now;
     const auto go_on = [&](FastestMotion& motion) {
@@ -78,13 +75,15 @@ TEST(FastestMotionTest, FromAnyMotionEachStepKeepsTheLimits) {
       now = {place, speed, speed - now.speed};
     };
     const auto most = static_cast<double>(std::min<std::int64_t>(before.iterations(), 200));
-    for (auto left = static_cast<int>(draw(0, most)); left > 0; --left) go_on(before);
+    for (auto left = static_cast<int>(dice.real(0, most)); left > 0; --left) go_on(before);
     const double stop = VelocityChange(-now.speed, now.acceleration, rates).displacement();
-    const double target = draw(0, 1) < 0.3   ? first
-                          : draw(0, 1) < 0.5 ? now.position + draw(-1, 1) * rates.speed * 60
-                                             : now.position + stop + draw(-1, 1) * rates.speed;
+    const double target = dice.real(0, 1) < 0.3 ? first
+                          : dice.real(0, 1) < 0.5
+                              ? now.position + dice.real(-1, 1) * rates.speed * 60
+                              : now.position + stop + dice.real(-1, 1) * rates.speed;
     FastestMotion motion(now, target, rates);
-    if (draw(0, 1) < 0.5) motion.stretch(motion.iterations() + static_cast<int>(draw(0, 4)));
+    if (dice.real(0, 1) < 0.5)
+      motion.stretch(motion.iterations() + static_cast<int>(dice.real(0, 4)));
     const double place = std::max(std::abs(now.position), std::abs(target));
     const double rounding = 1e-5 + 1e-13 * place / rates.jerk;
     for (std::int64_t left = motion.iterations() + 2; left > 0; --left) {

@@ -5,10 +5,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <string>
 #include <vector>
 
+#include "dice.hpp"
 #include "o80/base/error.hpp"
 #include "o80/describe/describe.hpp"
 
@@ -47,9 +47,7 @@ class StateLayoutTest : public testing::Test {
   void draw(Bytes& state) {
     constexpr double kWrong[] = {std::numeric_limits<double>::quiet_NaN(), HUGE_VAL, -HUGE_VAL};
     for (const NumberPlace& place : layout_.numbers()) {
-      const bool wrong = std::uniform_int_distribution(0, 3)(random_) == 0;
-      const double value = wrong ? kWrong[std::uniform_int_distribution(0, 2)(random_)]
-                                 : std::uniform_real_distribution(-1e3, 1e3)(random_);
+      const double value = dice_.one_in(4) ? kWrong[dice_.whole(0, 2)] : dice_.real(-1e3, 1e3);
       std::byte* at = state.data() + place.offset;
       if (place.kind == Kind::float64) std::memcpy(at, &value, sizeof value);
       const auto narrow = static_cast<float>(value);
@@ -64,7 +62,7 @@ class StateLayoutTest : public testing::Test {
 
   Schema schema_;
   StateLayout layout_;
-  std::mt19937 random_{1};
+  test::Dice dice_{1};
 };
 
 using States = testing::Types<One, Two, Nine, Mixed>;

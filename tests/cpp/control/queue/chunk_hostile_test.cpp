@@ -5,7 +5,6 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <random>
 
 #include "cases.hpp"
 #include "control/chunk_rig.hpp"
@@ -75,10 +74,7 @@ TEST(ChunkHostile, WhatCannotBeIsInvalidAndNothingIsLost) {
 // rule S1
 TEST(ChunkHostile, AmongCommandsPurgesHaltsAndFreshStartsEachEndsOnce) {
   for (unsigned seed = 0; seed < cases(60U); ++seed) {
-    std::mt19937 dice(seed);
-    const auto pick = [&](int low, int high) {
-      return std::uniform_int_distribution<int>(low, high)(dice);
-    };
+    Dice dice(seed);
     Schema schema = plain_robot(1);
     const auto hand = schema.add_type(
         "Hand", {scalar_field("place", Kind::float32), scalar_field("open", Kind::boolean),
@@ -98,7 +94,7 @@ TEST(ChunkHostile, AmongCommandsPurgesHaltsAndFreshStartsEachEndsOnce) {
       for (std::uint32_t i = 0; i < layouts[actuator].numbers().size(); ++i) {
         const NumberPlace& place = layouts[actuator].numbers()[i];
         visit_number(place.kind, [&]<class T>(T) {
-          const T value = static_cast<T>(pick(0, 1));
+          const T value = static_cast<T>(dice.whole(0, 1));
           std::memcpy(state.data() + place.offset, &value, sizeof value);
         });
       }
@@ -106,31 +102,32 @@ TEST(ChunkHostile, AmongCommandsPurgesHaltsAndFreshStartsEachEndsOnce) {
     };
     std::vector<std::pair<CommandId, std::uint32_t>> sent;
     for (int turn = 0; turn < 250; ++turn) {
-      const auto lane = static_cast<std::uint32_t>(pick(0, 2));
+      const auto lane = static_cast<std::uint32_t>(dice.whole(0, 2));
       const CommandId batch = rig.used_ids[lane] + 1;
-      for (int records = pick(0, 4); records > 0; --records) {
-        const int what = pick(0, 9);
+      for (std::int64_t records = dice.whole(0, 4); records > 0; --records) {
+        const std::int64_t what = dice.whole(0, 9);
         if (what == 0) {
-          rig.batch.purge(static_cast<std::uint16_t>(pick(0, 5)));
+          rig.batch.purge(static_cast<std::uint16_t>(dice.whole(0, 5)));
         } else if (what == 1) {
           rig.batch.purge_own(kEveryActuator);
         } else if (what < 5) {
-          const auto actuator = static_cast<std::uint32_t>(pick(0, 5));
-          RecordHead head = pick(0, 1) == 0 ? direct() : over(pick(1, 9));
-          if (pick(0, 2) == 0) head = overwriting(head);
+          const auto actuator = static_cast<std::uint32_t>(dice.whole(0, 5));
+          RecordHead head = dice.whole(0, 1) == 0 ? direct() : over(dice.whole(1, 9));
+          if (dice.whole(0, 2) == 0) head = overwriting(head);
           head.actuator = static_cast<std::uint16_t>(actuator);
           rig.batch.command(head, state_of(actuator));
         } else {
           std::vector<std::vector<std::byte>> rows;
           std::vector<BatchBuilder::Member> members;
           std::vector<const StateLayout*> of;
-          const auto count = static_cast<std::size_t>(pick(1, 20));
-          const auto profile = std::array{Profile::smooth, Profile::monotone, Profile::linear,
-                                          Profile::hold}[dice() % 4];
+          const auto count = static_cast<std::size_t>(dice.whole(1, 20));
+          const auto profile =
+              std::array{Profile::smooth, Profile::monotone, Profile::linear,
+                         Profile::hold}[static_cast<std::size_t>(dice.whole(0, 3))];
           rows.reserve(6);
-          const auto some = static_cast<std::uint64_t>(pick(1, 7));
+          const auto some = static_cast<std::uint64_t>(dice.whole(1, 7));
           for (std::uint32_t i = 0; i < 6; ++i) {
-            if (pick(0, 2) == 0) continue;
+            if (dice.whole(0, 2) == 0) continue;
             rows.emplace_back();
             for (std::size_t k = 0; k < count; ++k) {
               const auto state = state_of(i);
@@ -139,41 +136,44 @@ TEST(ChunkHostile, AmongCommandsPurgesHaltsAndFreshStartsEachEndsOnce) {
             RecordHead head;
             head.actuator = static_cast<std::uint16_t>(i);
             head.profile = profile;
-            const bool is_masked = i > 3 && pick(0, 1) == 0;
+            const bool is_masked = i > 3 && dice.whole(0, 1) == 0;
             members.push_back(
                 {head, std::span(is_masked ? &some : nullptr, is_masked ? 1 : 0), rows.back()});
             of.push_back(&layouts[i]);
           }
           if (members.empty()) continue;
-          const ChunkHead head{
-              .anchor = rig.next - pick(-40, 20),
-              .plan = static_cast<std::uint64_t>(pick(0, 1)),
-              .ease = static_cast<std::uint32_t>(pick(0, 12)),
-              .first = static_cast<std::uint32_t>(pick(0, static_cast<int>(count) - 1)),
-              .fixed = static_cast<std::uint8_t>(pick(0, 1)),
-              .reject_late = static_cast<std::uint8_t>(pick(0, 1)),
-              .final = static_cast<std::uint8_t>(pick(0, 1))};
-          rig.batch.chunk(members, head, every(static_cast<std::uint32_t>(pick(1, 9)), count), of);
+          const ChunkHead head{.anchor = rig.next - dice.whole(-40, 20),
+                               .plan = static_cast<std::uint64_t>(dice.whole(0, 1)),
+                               .ease = static_cast<std::uint32_t>(dice.whole(0, 12)),
+                               .first = static_cast<std::uint32_t>(
+                                   dice.whole(0, static_cast<std::int64_t>(count) - 1)),
+                               .fixed = static_cast<std::uint8_t>(dice.whole(0, 1)),
+                               .reject_late = static_cast<std::uint8_t>(dice.whole(0, 1)),
+                               .final = static_cast<std::uint8_t>(dice.whole(0, 1))};
+          rig.batch.chunk(members, head, every(static_cast<std::uint32_t>(dice.whole(1, 9)), count),
+                          of);
         }
       }
       for (std::uint32_t i = 0; i < rig.batch.records(); ++i) {
         sent.emplace_back(record_id(batch, i), lane);
       }
       const BlockIndex first = rig.send(lane);
-      rig.pool.batch(first).ticket = static_cast<std::uint64_t>(turn + pick(0, 3));
-      while (pick(0, 3) != 0 && !rig.check(lane, first, static_cast<std::uint32_t>(pick(1, 30)))) {
+      rig.pool.batch(first).ticket = static_cast<std::uint64_t>(turn + dice.whole(0, 3));
+      while (dice.whole(0, 3) != 0 &&
+             !rig.check(lane, first, static_cast<std::uint32_t>(dice.whole(1, 30)))) {
         rig.step();
       }
       rig.controller.take(lane, first, rig);
-      const int event = pick(0, 40);
+      const std::int64_t event = dice.whole(0, 40);
       if (event == 0) rig.controller.halt(rig.next);
       if (event == 1) rig.controller.restart(rig.observed.data(), nullptr, rig.next++);
-      if (event == 2) rig.controller.interrupt(static_cast<std::uint32_t>(pick(0, 5)), rig.next);
+      if (event == 2)
+        rig.controller.interrupt(static_cast<std::uint32_t>(dice.whole(0, 5)), rig.next);
       if (event == 3) {
-        rig.controller.purge_lane(static_cast<std::uint32_t>(pick(0, 2)), kEveryActuator, rig.next,
-                                  Reason::dead_frontend);
+        rig.controller.purge_lane(static_cast<std::uint32_t>(dice.whole(0, 2)), kEveryActuator,
+                                  rig.next, Reason::dead_frontend);
       }
-      for (int i = pick(0, 12); i > 0; --i) {
+      for (std::int64_t i = dice.whole(0, 12); i > 0; --i) {
         rig.step();
         for (std::uint32_t k = 0; k < 6; ++k) {
           ASSERT_EQ(layouts[k].first_not_finite(rig.controller.desired() +

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <random>
 
 #include "cases.hpp"
 #include "control/chunk_rig.hpp"
@@ -132,13 +131,10 @@ TEST(ChunkLimits, ATakeOverTakesTheTimeThatLimitsNeed) {
 // rule K10
 TEST(ChunkLimits, RandomScriptsStayWithinLimitsAndEndAtTheirLastRow) {
   for (unsigned seed = 0; seed < cases(60U); ++seed) {
-    std::mt19937 dice(seed);
-    const auto draw = [&](double low, double high) {
-      return std::exp(std::uniform_real_distribution<double>(std::log(low), std::log(high))(dice));
-    };
-    const double speed = draw(0.1, 10.0);
-    const double acceleration = draw(1.0, 100.0);
-    const double jerk = seed % 2 == 0 ? draw(10.0, 10'000.0) : kNoLimit;
+    Dice dice(seed);
+    const double speed = dice.magnitude(0.1, 10.0);
+    const double acceleration = dice.magnitude(1.0, 100.0);
+    const double jerk = seed % 2 == 0 ? dice.magnitude(10.0, 10'000.0) : kNoLimit;
     ChunkRig rig(limited_robot(limits_of(speed, acceleration, jerk)));
     ChunkScript script(seed);
     script.run(rig, 1500);

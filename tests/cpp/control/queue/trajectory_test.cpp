@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cmath>
-#include <random>
 
 #include "control/chunk_rig.hpp"
 
@@ -14,11 +13,8 @@ namespace {
 // rule K15
 TEST(Trajectory, ItsRowsArePlayedAsThoseOfAChunk) {
   for (unsigned seed = 0; seed < 200; ++seed) {
-    std::mt19937 dice(seed);
-    const auto pick = [&](std::int64_t low, std::int64_t high) {
-      return std::uniform_int_distribution<std::int64_t>(low, high)(dice);
-    };
-    const auto place = [&] { return std::uniform_real_distribution<double>(-1.0, 1.0)(dice); };
+    Dice dice(seed);
+    const auto place = [&] { return dice.real(-1.0, 1.0); };
     const bool limited = seed % 3 == 1;
     const auto robot = [&] {
       return limited ? limited_robot(limits_of(5.0, 40.0, 2000.0)) : plain_robot(1);
@@ -26,23 +22,23 @@ TEST(Trajectory, ItsRowsArePlayedAsThoseOfAChunk) {
     const auto profile =
         std::array{Profile::smooth, Profile::monotone, Profile::linear, Profile::hold}[seed % 4];
     // under limits the span of 16 rows is known in the first iteration
-    const auto rows = static_cast<std::uint32_t>(pick(1, limited ? 16 : 30));
+    const auto rows = static_cast<std::uint32_t>(dice.whole(1, limited ? 16 : 30));
     if (profile == Profile::linear && rows == 1) continue;  // a command
     std::vector<double> targets;
     for (std::uint32_t i = 0; i < rows; ++i)
-      targets.push_back(i > 0 && pick(0, 4) == 0 ? targets.back() : place());
-    const std::int64_t each = pick(1, 25);
+      targets.push_back(i > 0 && dice.one_in(5) ? targets.back() : place());
+    const std::int64_t each = dice.whole(1, 25);
     std::vector<std::uint32_t> due = every(static_cast<std::uint32_t>(each), rows);
     std::vector<std::int64_t> times;
-    const bool is_timed = rows > 1 && pick(0, 1) == 0;
+    const bool is_timed = rows > 1 && dice.one_in(2);
     for (std::uint32_t i = 0; is_timed && i < rows; ++i) {
-      due[i] = (i == 0 ? 0 : due[i - 1]) + static_cast<std::uint32_t>(pick(1, 30));
+      due[i] = (i == 0 ? 0 : due[i - 1]) + static_cast<std::uint32_t>(dice.whole(1, 30));
       // rounded halves up
-      times.push_back(due[i] * kMillisecond + pick(-kMillisecond / 2, kMillisecond / 2 - 1));
+      times.push_back(due[i] * kMillisecond + dice.whole(-kMillisecond / 2, kMillisecond / 2 - 1));
     }
     // behind a motion that goes on, or one that has ended
     const Iteration start = 60;
-    const std::int64_t before = pick(20, 80);
+    const std::int64_t before = dice.whole(20, 80);
     const double to = place();
     ChunkRig trajectory(robot());
     ChunkRig chunk(robot());
@@ -137,23 +133,22 @@ TEST(Trajectory, OnlyWhatFollowsAtOnceMakesUpForTheRoundingOfItsTimes) {
 TEST(Trajectory, HugeRowsStayFinite) {
   constexpr std::array kValues{-1.7e308, 1.7e308, 0.0, 1e-300};
   for (unsigned seed = 0; seed < 1000; ++seed) {
-    std::mt19937 dice(seed);
-    const auto pick = [&](std::uint32_t below) {
-      return static_cast<std::uint32_t>(
-          std::uniform_int_distribution<int>(0, static_cast<int>(below) - 1)(dice));
+    Dice dice(seed);
+    const auto pick = [&](std::int64_t below) {
+      return static_cast<std::size_t>(dice.whole(0, below - 1));
     };
     Rig rig(seed % 4 == 0 ? limited_robot(limits_of(5.0, 40.0, 2000.0)) : plain_robot(1));
     for (int i = 0; i < 4; ++i) {
       constexpr std::array kProfiles{Profile::smooth, Profile::monotone, Profile::linear,
                                      Profile::hold, Profile::minimum_jerk};
-      RecordHead head = over(1 + pick(5));
+      RecordHead head = over(dice.whole(1, 5));
       head.profile = kProfiles[pick(5)];
-      if (pick(3) > 0) head = overwriting(head);
+      if (!dice.one_in(3)) head = overwriting(head);
       std::vector<double> rows(1 + pick(9));
       for (double& row : rows) row = kValues[pick(4)];
       rig.add_rows(0, head, static_cast<std::uint32_t>(rows.size()), rows);
       rig.pulse();
-      for (std::uint32_t n = 1 + pick(30); n > 0; --n) {
+      for (std::size_t n = 1 + pick(30); n > 0; --n) {
         rig.step();
         ASSERT_TRUE(std::isfinite(rig.desired())) << seed;
       }

@@ -181,6 +181,11 @@ TEST(BatchPlan, KnowsWhatIsExpress) {
   rig.batch.mark("with a command");
   rig.add(0, over(1), {1.0});
   EXPECT_FALSE(effort().free);
+  rig.batch.resume(1);
+  EXPECT_TRUE(effort().free);
+  rig.batch.resume(1);
+  rig.batch.purge(1);
+  EXPECT_FALSE(effort().free) << "nothing else passes with it";
 }
 
 TEST(BatchPlan, AMarkIsCompletedAtOnceWhateverItsLength) {

@@ -94,8 +94,7 @@ TEST_F(AttachedSegmentTest, RefusesEveryCorruptedHeaderWithoutCrashing) {
       bytes[i] = static_cast<char>(value);
       write_all(path, bytes);
       try {
-        const auto segment =
-            AttachedSegment::attach("arm", Access::read_write, soon(), {.dead = true});
+        const auto segment = attach_dead(Access::read_write);
         EXPECT_LE(segment.view().offsets.file_bytes, whole.size());
         // the last byte of the last part: out of bounds would end the test
         const SegmentView& view = segment.view();
@@ -138,18 +137,14 @@ TEST_F(AttachedSegmentTest, WaitsPastAStoppedSegmentUnlessItIsToBeRead) {
     const LockFile file = LockFile::open(directory_.file_of("arm"), O_RDWR);
     const auto stopped = static_cast<std::uint32_t>(BackendState::stopped);
     const auto where =
-        static_cast<off_t>(AttachedSegment::attach("arm", Access::read_only, soon(), {.dead = true})
-                               .view()
-                               .offsets.counters +
-                           offsetof(Counters, state));
+        static_cast<off_t>(attach_dead().view().offsets.counters + offsetof(Counters, state));
     ASSERT_EQ(pwrite(file.descriptor(), &stopped, sizeof stopped, where), 4);
   }
 
   EXPECT_THAT(
       message_of<TimeoutError>([] { AttachedSegment::attach("arm", Access::read_only, soon()); }),
       AllOf(HasSubstr("was stopped"), HasSubstr("no new one has started")));
-  EXPECT_EQ(AttachedSegment::attach("arm", Access::read_only, soon(), {.dead = true}).life(),
-            Life::stopped);
+  EXPECT_EQ(attach_dead().life(), Life::stopped);
 }
 
 using AttachedSegmentDeathTest = SegmentTest;

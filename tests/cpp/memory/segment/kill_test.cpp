@@ -75,8 +75,7 @@ TEST_F(KillTest, EndsTheWaitsOfItsFrontendsAndLeavesTheHistory) {
   EXPECT_EQ(rows[79], 9);
 
   // also for those who come later, by option
-  EXPECT_EQ(AttachedSegment::attach("arm", Access::read_only, soon(), {.dead = true}).life(),
-            Life::killed);
+  EXPECT_EQ(attach_dead().life(), Life::killed);
   EXPECT_THAT(
       message_of<TimeoutError>([] { AttachedSegment::attach("arm", Access::read_only, soon()); }),
       HasSubstr("was killed"));

@@ -53,11 +53,7 @@ TEST_F(BurstCancelTest, TheRestIsCancelledWhenTheCallGivesUpItsWait) {
 }
 
 TEST_F(BurstCancelTest, ABurstThatWasStartedCanBeWaitedForAgainAfterATimeout) {
-  auto [manual, frontend] = StartedPair({.segment = "pair", .bursting = true});
-  const Burst burst = frontend.start_burst(4);
-  EXPECT_THROW(burst.wait(kAtOnce), TimeoutError);
-  EXPECT_EQ(manual.drive(), Step::standing);
-  EXPECT_EQ(burst.wait(kAtOnce).iteration(), 4);
+  play_bursts("a = burst 4; a raises TimeoutError; drive; a done 4; a waits");
 }
 
 // ------------------------------------------------------------------------------ groups

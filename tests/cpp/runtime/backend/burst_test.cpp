@@ -8,11 +8,6 @@ namespace {
 
 using BurstTest = ManualBackendTest;
 
-/// A burst of thousands of millions is under way.
-void wait_until_it_runs(const UntypedFrontend& frontend) {
-  while (frontend.published() < 10) std::this_thread::yield();
-}
-
 // rule G1
 TEST_F(BurstTest, RunsExactlyAsManyIterationsAndReturnsTheLastRow) {
   BurstingBackend bursting;
@@ -73,23 +68,7 @@ TEST_F(BurstTest, ABatchThatEndsWithoutMotionNeedsNoIteration) {
 }
 
 TEST_F(BurstTest, AMovementThatIsInterruptedEndsItsBurstInThatRow) {
-  auto [manual, frontend] = StartedPair({.segment = "pair", .bursting = true});
-  add(frontend, 0, 9.0, {.pace = iterations(9)});
-  const Batch batch = frontend.pulse_to_end();
-  manual.before_publish = [&] {
-    if (manual.backend.iteration() == 4) manual.backend.interrupt(0);
-  };
-  manual.drive();
-  EXPECT_EQ(batch.handle(0).status, Status::interrupted);
-  try {
-    frontend.wait_for_end(batch, kAtOnce);
-    FAIL() << "it was interrupted";
-  } catch (const NotCompleted& error) {
-    EXPECT_THAT(error.what(), HasSubstr("'shoulder' was interrupted by the driver in iteration 4"));
-    EXPECT_EQ(error.observation().iteration(), 4);
-  }
-  EXPECT_EQ(frontend.wait_for_end(batch, kAtOnce, {}, {.check = false}).iteration(), 4);
-  EXPECT_EQ(frontend.published(), 4);
+  play_bursts("0 to 9 over 9; a = to end; in 4 interrupt 0; drive; a interrupted @4; last 4");
 }
 
 // rule G1
@@ -130,33 +109,14 @@ TEST_F(BurstTest, OfAGroupLetsAllRunBeforeItWaits) {
 }
 
 TEST_F(BurstTest, ThatIsRejectedBecauseTheBackendEndsSaysWhyItEnded) {
-  for (const BackendState state : {BackendState::stopped, BackendState::failed}) {
-    auto [manual, frontend] = StartedPair({.segment = "pair", .bursting = true});
-    add(frontend, 0, 1.0);
-    const Burst burst = frontend.start_burst(5, {.at = 3});
-    ASSERT_EQ(manual.iterate(), Step::run);
-    manual.backend.end(state, "the elbow is too hot");
-    EXPECT_TRUE(burst.done());
-    const auto wait = [&] { burst.wait(kPatience); };
-    if (state == BackendState::stopped) {
-      EXPECT_THROW(wait(), BackendStopped);
-    } else {
-      EXPECT_THAT(message_of<BackendFailed>(wait), ::testing::HasSubstr("the elbow is too hot"));
-    }
-  }
+  const std::string later = "0 to 1; a = burst 5 at 3; run 1; a undone; ";
+  play_bursts(later + "end stopped; a raises BackendStopped");
+  play_bursts(later + "end failed the elbow is hot; a raises BackendFailed the elbow is hot");
 }
 
 TEST_F(BurstTest, AMovementIsNotCalledEndedWhenTheBackendStopsInIt) {
-  BurstingBackend bursting;
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 1.0, {.pace = iterations(1'000'000'000)});
-  const Batch batch = frontend.pulse_to_end();
-  wait_until_it_runs(frontend);
-  bursting.stop();
-  bursting.manual.backend.end(BackendState::stopped);
-  EXPECT_THROW(frontend.wait_for_end(batch, kPatience), BackendStopped);
-  EXPECT_THROW(batch.wait(kPatience), BackendStopped);
-  EXPECT_EQ(batch.handle(0).status, Status::purged);
+  play_bursts(R"(0 to 1 over 1e9; a = to end; run 3; end stopped; a raises BackendStopped
+    a purged stopped)");
 }
 
 TEST_F(BurstTest, AFrontendThatDiesInABurstLeavesTheBackendUsable) {
@@ -164,7 +124,7 @@ TEST_F(BurstTest, AFrontendThatDiesInABurstLeavesTheBackendUsable) {
   StandingProcess child([](const StandingProcess::Stand& stand) {
     UntypedFrontend frontend("pair", {.timeout = kPatience});
     frontend.start_burst(1'000'000'000'000);
-    wait_until_it_runs(frontend);
+    frontend.wait_for(10, kPatience);
     stand();
   });
   child.kill_now();

@@ -111,24 +111,8 @@ TEST_F(MovingTest, AResumeSaysWhatItWaitsFor) {
 }
 
 TEST_F(ResumeTest, NeedsNoControl) {
-  StartedBackend manual;
-  UntypedFrontend holder("pair");
-  UntypedFrontend other("pair");
-  holder.add_take_control();
-  holder.pulse();
-  const std::uint64_t number = other.halt("");
-  manual.run(1);
-  BatchBuilder mixed;
-  mixed.resume(number);
-  mixed.purge(kEveryActuator);
-  const Batch refused = other.pulse(mixed);
-  const Batch resume = send_resume(other, number);
-  manual.run(1);
-  EXPECT_EQ(refused.handle(0).reason, Reason::exclusive) << "nothing else passes with it";
-  EXPECT_EQ(resume.handle(0).status, Status::completed) << resume.handle(0).text;
-  const Batch batch = send(other, 0, 1.0);
-  manual.run(1);
-  EXPECT_EQ(batch.handle(0).reason, Reason::exclusive) << "control stays with its holder";
+  play(R"(a = take; run 1; B: halt; run 1; B: r = resume 1; run 1; r completed; B: b = 0 to 1; run 1
+    b rejected exclusive  # control stays with its holder)");
 }
 
 TEST_F(ResumeTest, WithoutAHaltChangesNothing) {

@@ -229,17 +229,6 @@ TEST_F(SmallJournalTest, AReaderThatWasOvertakenIsToldHowMuchItMissedAndGoesOn) 
   for (std::size_t i = 3; i < entries.size(); ++i) ASSERT_FALSE(entries[i].records_lost);
 }
 
-TEST_F(ManualBackendTest, ABackendMayHaveNoJournal) {
-  auto [manual, frontend] = StartedPair({.segment = "pair", .journal = 0});
-  for (int i = 0; i < 5000; ++i) add(frontend, 0, i);
-  frontend.pulse();
-  manual.run(10);
-  Journal journal(frontend);
-  JournalEntry entry;
-  EXPECT_FALSE(journal.exists());
-  EXPECT_FALSE(journal.next(entry));
-}
-
 // ------------------------------------------------------------------------------ deaths, bursts
 
 TEST_F(JournalAuthorTest, ShowsTheDeathOfACommander) {

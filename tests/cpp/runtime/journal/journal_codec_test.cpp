@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cstring>
 #include <functional>
-#include <map>
 #include <random>
 #include <string>
 #include <utility>
@@ -55,8 +54,12 @@ class Draw {
     head.amount = static_cast<std::int64_t>(number());
     head.payload_bytes = static_cast<std::uint32_t>(below(4) == 0 ? below(2000) : below(40));
     append(blocks, head);
-    for (std::uint32_t i = 0; i < head.payload_bytes; ++i)
-      blocks.push_back(static_cast<std::byte>(number()));
+    std::string payload;
+    while (payload.size() < head.payload_bytes) payload += static_cast<char>(number());
+    const auto bytes = std::as_bytes(std::span(payload));
+    blocks.insert(blocks.end(), bytes.begin(), bytes.end());
+    if (head.kind == RecordKind::mark && !payload.empty() && payload.size() <= kMaxMarkBytes)
+      marks.push_back(payload);
     blocks.resize((blocks.size() + kBlockBytes - 1) / kBlockBytes * kBlockBytes);
   }
   std::vector<std::byte> batch(CommandId id) {
@@ -131,13 +134,14 @@ class Draw {
     return item;
   }
 
-  /// All kinds of entries in any order, with batches of two lanes whose blocks come in pieces.
+  /// All kinds of entries in any order, with batches of two lanes whose blocks come in pieces; a
+  /// few more than `count`, so that each batch is whole.
   std::vector<JournalItem> journal(std::size_t count) {
     std::vector<JournalItem> items;
     std::array<std::vector<std::byte>, 2> left;
     std::array<std::uint32_t, 2> read{};
     std::array<CommandId, 2> ids{};
-    while (items.size() < count) {
+    while (items.size() < count || !left[0].empty() || !left[1].empty()) {
       const auto kind = static_cast<JournalKind>(below(kJournalKinds));
       if (kind != JournalKind::records) {
         items.push_back(plain(kind));
@@ -145,6 +149,7 @@ class Draw {
       }
       const std::size_t lane = below(2);
       if (left[lane].empty()) {
+        if (items.size() >= count) continue;
         ids[lane] = number();
         left[lane] = batch(ids[lane]);
         read[lane] = 0;
@@ -167,6 +172,8 @@ class Draw {
     }
     return items;
   }
+
+  std::vector<std::string> marks;  // texts, of the records so far
 
  private:
   std::mt19937_64 random_;
@@ -206,47 +213,21 @@ TEST(JournalCodecTest, DecodesWhateverWasEncoded) {
   }
 }
 
-/// Kinds and payloads of the records of whole batches.
-std::vector<std::pair<RecordKind, std::string>> records_in(const std::vector<JournalItem>& items) {
-  std::map<std::uint64_t, std::vector<std::byte>> batches;
-  for (const JournalItem& item : items) {
-    std::vector<std::byte>& batch = batches[item.head.id];
-    if (item.head.kind == JournalKind::records)
-      batch.insert(batch.end(), item.payload.begin(), item.payload.end());
-  }
-  std::vector<std::pair<RecordKind, std::string>> records;
-  for (const auto& [id, blocks] : batches) {
-    for (std::size_t at = kBlockBytes; at < blocks.size();) {
-      RecordHead head;
-      std::memcpy(&head, &blocks[at], sizeof head);
-      if (at + sizeof head + head.payload_bytes > blocks.size()) break;  // the rest was not read
-      const auto* text = reinterpret_cast<const char*>(&blocks[at]) + sizeof head;
-      records.emplace_back(head.kind, std::string(text, head.payload_bytes));
-      at += blocks_of(head.payload_bytes) * kBlockBytes;
-    }
-  }
-  return records;
-}
-
 TEST(JournalCodecTest, FindsTheTextsOfMarksHoweverTheirBlocksAreRead) {
   std::size_t marks = 0;
   for (std::uint32_t seed = 0; seed < 200; ++seed) {
-    const std::vector<JournalItem> items = Draw(seed).journal(100);
-    std::vector<std::string> sent;
-    for (const auto& [kind, text] : records_in(items))
-      if (kind == RecordKind::mark && !text.empty() && text.size() <= kMaxMarkBytes)
-        sent.push_back(text);
+    Draw draw(seed);
     JournalEncoder encoder;
     std::vector<std::byte> bytes;
     std::vector<std::string> found;
-    for (const JournalItem& item : items) {
+    for (const JournalItem& item : draw.journal(100)) {
       encoder.encode(item.head, item.payload, bytes);
       for (JournalEncoder::Mark& mark : encoder.take_marks()) {
         EXPECT_EQ(mark.iteration, item.head.iteration);
         found.push_back(std::move(mark.text));
       }
     }
-    ASSERT_THAT(found, ::testing::UnorderedElementsAreArray(sent)) << seed;
+    ASSERT_THAT(found, ::testing::UnorderedElementsAreArray(draw.marks)) << seed;
     marks += found.size();
   }
   EXPECT_GT(marks, 50U);
