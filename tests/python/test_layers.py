@@ -203,27 +203,27 @@ def test_all_bindings_include_all_casters_by_one_header() -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (34_397, 0),
-    "python/bindings": (5_507, 0),
-    "python/o80": (29_863, 0),
+    "include, src": (33_924, 0),
+    "python/bindings": (5_355, 0),
+    "python/o80": (29_396, 0),
     "python/o80/hybrid": (2_458, 0),
-    "python/o80/learning/training, python/o80/learning/__main__.py": (1_479, 0),
-    "python/o80/view/page": (1_222, 0),
+    "python/o80/learning/training, python/o80/learning/__main__.py": (1_476, 0),
+    "python/o80/view/page": (1_209, 0),
     "docs": (565, 0),
-    "devices": (8_849, 4_498),
+    "devices": (8_389, 4_349),
     "gateways/lerobot": (529, 686),
     "gateways/ros2": (903, 955),
     "robots/arms": (4_565, 3_153),
     "robots/pam, robots/two_joints": (2_108, 1_184),
-    "simulators/mujoco": (5_372, 4_686),
-    "apps/table_tennis": (8_399, 4_409),
-    "benchmarks, tools": (4_306, 0),
+    "simulators/mujoco": (5_372, 4_673),
+    "apps/table_tennis": (8_396, 4_409),
+    "benchmarks, tools": (4_158, 0),
     "examples": (1_985, 0),
-    "tests, conftest.py": (0, 59_617),
+    "tests, conftest.py": (0, 59_015),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}
-LARGEST_FILE, MEDIAN_FILE = 620, 100
+LARGEST_FILE, MEDIAN_FILE = 600, 100
 
 
 @cache
