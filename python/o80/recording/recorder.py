@@ -5,7 +5,8 @@ import math
 import os
 import time
 import warnings
-from collections.abc import Iterator, Sequence
+import weakref
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,7 +75,7 @@ class Recorder:
         self.file = open_file(path, form, proceed=proceed)
         before = [each for each in files_of(path) if each != self.file.path]
         self._bytes_before = sum(each.stat().st_size for each in before)
-        self.file.make_room = self._make_room
+        self.file.make_room = _weakly(self._make_room)
         self._file_begun = time.monotonic()
         self.sources: dict[str, Source] = {}
         self._search_at = 0.0
@@ -222,7 +223,7 @@ class Recorder:
         self._file_begun = time.monotonic()
         not_finished = full.size + room_for_end(full.found)
         self._bytes_before += not_finished
-        self.file.make_room = self._make_room
+        self.file.make_room = _weakly(self._make_room)
         try:
             for source in self.sources.values():
                 source.continue_in(self.file)
@@ -278,6 +279,17 @@ class Recorder:
                         raise
                     self._left_out.add(segment.name)  # the others continue
                     warnings.warn(f"not recorded: {error}", RuntimeWarning, stacklevel=3)
+
+
+def _weakly(make_room: Callable[[int], None]) -> Callable[[int], None]:
+    """Avoids a reference cycle, so that a dropped recorder releases its file at once."""
+    method = weakref.WeakMethod(make_room)
+
+    def call(length: int) -> None:
+        if (bound := method()) is not None:
+            bound(length)
+
+    return call
 
 
 def size_of(text: str, name: str) -> float:
