@@ -205,7 +205,7 @@ def test_all_bindings_include_all_casters_by_one_header() -> None:
 CEILINGS = {
     "include, src": (33_924, 0),
     "python/bindings": (5_355, 0),
-    "python/o80": (29_396, 0),
+    "python/o80": (29_408, 0),
     "python/o80/hybrid": (2_458, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_476, 0),
     "python/o80/view/page": (1_209, 0),
@@ -219,7 +219,7 @@ CEILINGS = {
     "apps/table_tennis": (8_396, 4_409),
     "benchmarks, tools": (4_158, 0),
     "examples": (1_985, 0),
-    "tests, conftest.py": (0, 59_015),
+    "tests, conftest.py": (0, 59_017),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}
