@@ -1,6 +1,7 @@
 #include "vision/blobs.hpp"
 
 #include <algorithm>
+#include <functional>
 
 namespace o80::vision {
 
@@ -12,17 +13,6 @@ std::uint8_t probability(const ColourTable& table, const std::uint8_t* pixel) no
   const auto index =
       static_cast<std::size_t>((pixel[0] >> 3) << 10 | (pixel[1] >> 3) << 5 | (pixel[2] >> 3));
   return table[index];
-}
-
-void keep_largest(Blobs& blobs, const Blob& blob) noexcept {
-  int place = blobs.count;
-  while (place > 0 && blobs.list[static_cast<std::size_t>(place - 1)].weight < blob.weight) --place;
-  if (place == kMaxBlobs) return;
-  blobs.count = std::min(blobs.count + 1, kMaxBlobs);
-  for (int i = blobs.count - 1; i > place; --i) {
-    blobs.list[static_cast<std::size_t>(i)] = blobs.list[static_cast<std::size_t>(i - 1)];
-  }
-  blobs.list[static_cast<std::size_t>(place)] = blob;
 }
 
 }  // namespace
@@ -82,7 +72,7 @@ void BlobFinder::find_runs(const Image& image, const Region& region, const BlobR
   }
 }
 
-Blobs BlobFinder::find(const Image& image, Region region, const BlobRule& rule) {
+std::vector<Blob> BlobFinder::find(const Image& image, Region region, const BlobRule& rule) {
   region = {std::clamp(region.left, 0, image.width), std::clamp(region.top, 0, image.height),
             std::clamp(region.right, 0, image.width), std::clamp(region.bottom, 0, image.height)};
   find_runs(image, region, rule);
@@ -106,16 +96,19 @@ Blobs BlobFinder::find(const Image& image, Region region, const BlobRule& rule) 
     sum.bottom = std::max(sum.bottom, run.row + 1);
   }
   const double per_pixel = static_cast<double>(rule.step) * rule.step;
-  Blobs found;
+  std::vector<Blob> found;
   for (const Sum& sum : sums) {
     const double area = sum.pixels * per_pixel;
     if (sum.pixels == 0 || area < rule.min_area) continue;
     const bool cut = sum.left == 0 || sum.top == 0 ||
                      region.left + sum.right * rule.step >= region.right ||
                      region.top + sum.bottom * rule.step >= region.bottom;
-    keep_largest(
-        found, {{sum.x / sum.weight, sum.y / sum.weight}, area, sum.weight * per_pixel / 255, cut});
+    found.push_back(
+        {{sum.x / sum.weight, sum.y / sum.weight}, area, sum.weight * per_pixel / 255, cut});
   }
+  const auto end = found.begin() + static_cast<std::ptrdiff_t>(std::min(found.size(), kMaxBlobs));
+  std::ranges::partial_sort(found, end, std::ranges::greater{}, &Blob::weight);
+  found.erase(end, found.end());
   return found;
 }
 

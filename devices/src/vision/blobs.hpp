@@ -31,12 +31,7 @@ struct Blob {
   bool cut = false;   // touches the border of the region: the centre is not the ball's
 };
 
-inline constexpr int kMaxBlobs = 8;
-
-struct Blobs {
-  std::array<Blob, kMaxBlobs> list;
-  int count = 0;
-};
+inline constexpr std::size_t kMaxBlobs = 8;
 
 /// Criteria of a blob.
 struct BlobRule {
@@ -44,13 +39,13 @@ struct BlobRule {
   double min_area = 6;  // [px^2]
 };
 
-/// Finds the blobs of ball colour in a region, the largest first. Memory is reused from
-/// call to call.
+/// Finds the blobs of ball colour in a region.
 class BlobFinder {
  public:
   explicit BlobFinder(const ColourTable& table) : table_(table) {}
 
-  Blobs find(const Image& image, Region region, const BlobRule& rule);
+  /// Returns the blobs with the largest weights, at most kMaxBlobs, the largest first.
+  std::vector<Blob> find(const Image& image, Region region, const BlobRule& rule);
 
  private:
   /// Consecutive pixels of one row above the threshold.
@@ -64,7 +59,7 @@ class BlobFinder {
   void join(int above, int run) noexcept;
 
   ColourTable table_;
-  std::vector<Run> runs_;
+  std::vector<Run> runs_;  // keeps its memory from call to call
 };
 
 }  // namespace o80::vision

@@ -77,9 +77,6 @@ Matrix<C, R> transposed(const Matrix<R, C>& a) noexcept {
 inline double dot(const Vector& a, const Vector& b) noexcept {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
-inline Vector cross(const Vector& a, const Vector& b) noexcept {
-  return {{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}};
-}
 inline double length(const Vector& a) noexcept { return std::sqrt(dot(a, a)); }
 
 /// Inverts a symmetric 3 x 3 matrix by its cofactors; false: not invertible.

@@ -33,9 +33,7 @@ using Sightings = nb::ndarray<const double, nb::shape<-1, 4>, nb::c_contig, nb::
 using Table =
     nb::ndarray<const std::uint8_t, nb::shape<32 * 32 * 32>, nb::c_contig, nb::device::cpu>;
 using Bytes = nb::ndarray<const std::uint8_t, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
-using Three = std::array<double, 3>;
 using Place = nb::ndarray<const double, nb::shape<3>, nb::c_contig, nb::device::cpu>;
-using Nine = std::array<double, 9>;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
@@ -56,11 +54,9 @@ Doubles array_of(const Matrix<R, C>& matrix) {
   return made;
 }
 
-Vector vector(const Place& values) { return {{values(0), values(1), values(2)}}; }
-
 Camera camera(const std::array<double, 2>& size, const std::array<double, 2>& focal,
               const std::array<double, 2>& centre, const std::array<double, 5>& distortion,
-              const Nine& rotation, const Three& translation) {
+              const std::array<double, 9>& rotation, const std::array<double, 3>& translation) {
   if (!(size[0] >= 1) || !(size[1] >= 1) || !(focal[0] > 0) || !(focal[1] > 0)) {
     throw nb::value_error("the size and the focal lengths of a camera must be positive");
   }
@@ -116,15 +112,14 @@ Doubles find(BlobFinder& finder, const Bytes& image, std::optional<std::array<in
                    static_cast<int>(image.shape(0))};
   const Region where = region ? Region{(*region)[0], (*region)[1], (*region)[2], (*region)[3]}
                               : Region{0, 0, seen.width, seen.height};
-  Blobs blobs;
+  std::vector<Blob> blobs;
   {
     const nb::gil_scoped_release released;
     blobs = finder.find(seen, where, {.step = step, .min_area = min_area});
   }
   double* values = nullptr;
-  Doubles made = array({static_cast<std::size_t>(blobs.count), 5}, values);
-  for (int i = 0; i < blobs.count; ++i) {
-    const Blob& blob = blobs.list[static_cast<std::size_t>(i)];
+  Doubles made = array({blobs.size(), 5}, values);
+  for (const Blob& blob : blobs) {
     *values++ = blob.centre.x;
     *values++ = blob.centre.y;
     *values++ = blob.area;
@@ -147,7 +142,7 @@ std::optional<std::tuple<Doubles, Doubles, std::uint64_t, double>> locate_ball(
     list.push_back({static_cast<int>(camera), {sightings(i, 1), sightings(i, 2)}, sightings(i, 3)});
   }
   ConsensusRule rule{tolerance, noise, radius, least, std::nullopt};
-  if (expected) rule.expected = vector(*expected);
+  if (expected) rule.expected = Vector{{(*expected)(0), (*expected)(1), (*expected)(2)}};
   const std::optional<Located> found = locate(cameras, list, rule);
   if (!found) return std::nullopt;
   return std::tuple(array_of(found->point), array_of(found->covariance), found->cameras,
@@ -162,14 +157,8 @@ NB_MODULE(_vision, module) {
   using namespace o80::vision;  // NOLINT(google-build-using-namespace)
   module.doc() = "Cameras, detection of a ball in images, and its place.";
   nb::class_<Camera>(module, "Camera", "A pinhole camera with distortion, as OpenCV writes it.")
-      .def(
-          "__init__",
-          [](Camera* self, const std::array<double, 2>& size, const std::array<double, 2>& focal,
-             const std::array<double, 2>& centre, const std::array<double, 5>& distortion,
-             const Nine& rotation, const Three& translation) {
-            new (self) Camera(camera(size, focal, centre, distortion, rotation, translation));
-          },
-          "size"_a, "focal"_a, "centre"_a, "distortion"_a, "rotation"_a, "translation"_a)
+      .def(nb::new_(&camera), "size"_a, "focal"_a, "centre"_a, "distortion"_a, "rotation"_a,
+           "translation"_a)
       .def("project", &project, "points"_a,
            "(N, 3) [m] => (N, 3): x and y [px] and depth [m]; NaN where it is not seen.")
       .def("directions", &directions, "pixels"_a,
@@ -178,10 +167,8 @@ NB_MODULE(_vision, module) {
           "place", [](const Camera& self) { return array_of(self.place()); },
           nb::rv_policy::automatic, "(3,) in the world [m].");
   nb::class_<BlobFinder>(module, "BlobFinder", "Finds blobs of the colour of a ball.")
-      .def(
-          "__init__",
-          [](BlobFinder* self, const Table& table) { new (self) BlobFinder(blob_finder(table)); },
-          "table"_a, "table: (32768,) probabilities, 0 to 255, by 5 bits of red, green, blue.")
+      .def(nb::new_(&blob_finder), "table"_a,
+           "table: (32768,) probabilities, 0 to 255, by 5 bits of red, green, blue.")
       .def("find", &find, "image"_a, "region"_a = nb::none(), "step"_a = 1, "min_area"_a = 6.0,
            "(n, 5): x, y [px], area [px^2], weight, 1 if the region cuts it; the largest first.");
   module.def("locate", &locate_ball, "cameras"_a, "sightings"_a, "tolerance"_a = 3.0,

@@ -50,11 +50,11 @@ TEST(BlobFinder, FindsTheCentreOfADiscBetweenPixels) {
   for (double shift = 0; shift < 1; shift += 0.1) {
     Picture picture;
     picture.disc(60 + shift, 40 + shift / 2, 4);
-    const Blobs blobs = finder.find(picture.image(), kWhole, {});
-    ASSERT_EQ(blobs.count, 1);
-    EXPECT_THAT(blobs.list[0].centre.x, DoubleNear(60 + shift, 0.06));
-    EXPECT_THAT(blobs.list[0].centre.y, DoubleNear(40 + shift / 2, 0.06));
-    EXPECT_THAT(blobs.list[0].area, DoubleNear(M_PI * 16, 8));
+    const std::vector<Blob> blobs = finder.find(picture.image(), kWhole, {});
+    ASSERT_EQ(blobs.size(), 1U);
+    EXPECT_THAT(blobs[0].centre.x, DoubleNear(60 + shift, 0.06));
+    EXPECT_THAT(blobs[0].centre.y, DoubleNear(40 + shift / 2, 0.06));
+    EXPECT_THAT(blobs[0].area, DoubleNear(M_PI * 16, 8));
   }
 }
 
@@ -63,7 +63,7 @@ TEST(BlobFinder, ACoarseSearchFindsEveryDiscWiderThanItsDiagonal) {
   for (int shift = 0; shift < 16; ++shift) {
     Picture picture;
     picture.disc(50 + shift % 4, 60 + shift / 4, 3.0);
-    EXPECT_THAT(finder.find(picture.image(), kWhole, {.step = 4, .min_area = 1}).count, Ge(1));
+    EXPECT_THAT(finder.find(picture.image(), kWhole, {.step = 4, .min_area = 1}).size(), Ge(1U));
   }
 }
 
@@ -71,12 +71,12 @@ TEST(BlobFinder, ListsTheLargestFirstAndNoMoreThanItHasRoomFor) {
   BlobFinder finder(red_table());
   Picture picture;
   for (int i = 0; i < 12; ++i) picture.disc(10 + 12 * i, 50, 1.5 + 0.3 * i);
-  const Blobs blobs = finder.find(picture.image(), kWhole, {});
+  const std::vector<Blob> blobs = finder.find(picture.image(), kWhole, {});
 
-  ASSERT_EQ(blobs.count, kMaxBlobs);
-  EXPECT_THAT(blobs.list[0].centre.x, DoubleNear(142, 0.1));
+  ASSERT_EQ(blobs.size(), kMaxBlobs);
+  EXPECT_THAT(blobs[0].centre.x, DoubleNear(142, 0.1));
   for (std::size_t i = 1; i < kMaxBlobs; ++i) {
-    EXPECT_LT(blobs.list[i].weight, blobs.list[i - 1].weight);
+    EXPECT_LT(blobs[i].weight, blobs[i - 1].weight);
   }
 }
 
@@ -88,10 +88,10 @@ TEST(BlobFinder, JoinsWhatMeetsInALaterRow) {
     picture.disc(50, y, 1);
   }
   for (int x = 30; x < 50; ++x) picture.disc(x, 40, 1);
-  const Blobs blobs = finder.find(picture.image(), kWhole, {});
+  const std::vector<Blob> blobs = finder.find(picture.image(), kWhole, {});
 
-  ASSERT_EQ(blobs.count, 1);
-  EXPECT_THAT(blobs.list[0].centre.x, DoubleNear(40, 0.2));
+  ASSERT_EQ(blobs.size(), 1U);
+  EXPECT_THAT(blobs[0].centre.x, DoubleNear(40, 0.2));
 }
 
 TEST(BlobFinder, SaysWhatTheRegionCuts) {
@@ -99,8 +99,8 @@ TEST(BlobFinder, SaysWhatTheRegionCuts) {
   Picture picture;
   picture.disc(60, 40, 5);
 
-  EXPECT_FALSE(finder.find(picture.image(), {50, 30, 70, 50}, {}).list[0].cut);
-  EXPECT_TRUE(finder.find(picture.image(), {60, 30, 80, 50}, {}).list[0].cut);
+  EXPECT_FALSE(finder.find(picture.image(), {50, 30, 70, 50}, {})[0].cut);
+  EXPECT_TRUE(finder.find(picture.image(), {60, 30, 80, 50}, {})[0].cut);
 }
 
 TEST(BlobFinder, LooksAtNothingOutsideOfTheImage) {
@@ -108,10 +108,10 @@ TEST(BlobFinder, LooksAtNothingOutsideOfTheImage) {
   Picture picture;
   picture.disc(2, 2, 4);
 
-  EXPECT_EQ(finder.find(picture.image(), {-50, -50, 20, 20}, {}).count, 1);
-  EXPECT_EQ(finder.find(picture.image(), {-50, -50, -20, -20}, {}).count, 0);
-  EXPECT_EQ(finder.find(picture.image(), {500, 500, 600, 600}, {}).count, 0);
-  EXPECT_EQ(finder.find(picture.image(), {40, 40, 20, 20}, {}).count, 0);
+  EXPECT_EQ(finder.find(picture.image(), {-50, -50, 20, 20}, {}).size(), 1U);
+  EXPECT_EQ(finder.find(picture.image(), {-50, -50, -20, -20}, {}).size(), 0U);
+  EXPECT_EQ(finder.find(picture.image(), {500, 500, 600, 600}, {}).size(), 0U);
+  EXPECT_EQ(finder.find(picture.image(), {40, 40, 20, 20}, {}).size(), 0U);
 }
 
 }  // namespace
