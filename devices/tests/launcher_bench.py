@@ -34,7 +34,7 @@ class Bench:
 
     def connect(self) -> None:
         self.link = Link(zmq, self.context, self.address, 0.0)
-        self.client = Launcher(self, self.timing)
+        self.client = Launcher(self.exchange, self.timing)
 
     def exchange(self, request: Request, deliver_by: int, wait: int) -> Exchange:
         if request.kind is Kind.LAUNCH_BALL:

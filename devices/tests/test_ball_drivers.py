@@ -20,11 +20,11 @@ RATE = 180
 
 
 @contextlib.contextmanager
-def inline(cameras: str) -> Iterator[tuple[o80.Frontend, o80.Frontend]]:
+def inline(
+    cameras: str, driver: type[SyntheticCameras] = SyntheticCameras
+) -> Iterator[tuple[o80.Frontend, o80.Frontend]]:
     with (
-        o80.robots.load(SyntheticCameras).inline(
-            cameras, frequency=RATE, seed=1, history=4
-        ) as seen,
+        o80.robots.load(driver).inline(cameras, frequency=RATE, seed=1, history=4) as seen,
         o80.robots.load(BallTracker).inline(
             f"{cameras}-ball", frequency=RATE, cameras=cameras
         ) as ball,
@@ -65,14 +65,8 @@ class StampedCameras(SyntheticCameras):
 
 
 def test_a_row_of_the_tracker_has_the_largest_error_of_the_times_of_its_images() -> None:
-    name = f"test-{os.getpid()}-stamped"
     found = set()
-    with (
-        o80.robots.load(StampedCameras).inline(name, frequency=RATE, history=4) as cameras,
-        o80.robots.load(BallTracker).inline(
-            f"{name}-ball", frequency=RATE, cameras=name
-        ) as tracker,
-    ):
+    with inline(f"test-{os.getpid()}-stamped", StampedCameras) as (cameras, tracker):
         for i in range(60):
             if i != 50:
                 cameras.burst(1)

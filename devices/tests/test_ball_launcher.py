@@ -118,13 +118,12 @@ def test_an_option_out_of_range_is_named(options: dict[str, Any]) -> None:
 
 
 def test_a_stop_without_connection_says_that_the_motors_may_turn(
-    served: Served, capsys: pytest.CaptureFixture[str]
+    served: Served, robot: o80.Frontend, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    launcher = o80.robots.load(ROBOT)
-    with launcher.inline("test-launcher", address=served.address, heartbeat_timeout=0.0) as robot:
-        until(robot, "status", Status.ready)
-        served.die()
-        until(robot, "status", Status.disconnected)
+    until(robot, "status", Status.ready)
+    served.die()
+    until(robot, "status", Status.disconnected)
+    robot.close()
     assert "so its motors cannot be stopped" in capsys.readouterr().err
 
 

@@ -212,8 +212,8 @@ def test_missing_numbers_are_counted_over_their_wrap(numbers: tuple[int, ...], l
 @pytest.mark.parametrize("pixel_format", ["BayerRG8", "BayerGB8", "BayerGR8", "BayerBG8"])
 def test_the_colours_of_a_pattern_are_found(pixel_format: PixelFormat) -> None:
     colour = {"R": 240, "G": 130, "B": 30}
-    first_row = {"RG": "RG", "GB": "GB", "GR": "GR", "BG": "BG"}[pixel_format[5:7]]
-    second_row = {"RG": "GB", "GB": "RG", "GR": "BG", "BG": "GR"}[pixel_format[5:7]]
+    first_row = pixel_format[5:7]
+    second_row = {"RG": "GB", "GB": "RG", "GR": "BG", "BG": "GR"}[first_row]
     rows = [[colour[c] for c in row] * 8 for row in (first_row, second_row)] * 8
     image = rgb_of(np.array(rows, np.uint8).ravel(), (16, 16), pixel_format)
     assert (image[4:-4, 4:-4] == [240, 130, 30]).all()

@@ -5,6 +5,7 @@ import socket
 import struct
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +42,14 @@ from o80_devices.motion_capture.qualisys_packets import (
 from o80_devices.motion_capture.sensor import Reason
 
 UNTURNED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-WHOLE = data_packet(5, 7, 3 * [BODY.pack(1.0, 2.0, 3.0, *UNTURNED, 0.1)])[HEADER.size :]
+
+
+def data_of(*bodies: bytes) -> bytes:
+    """Content of a packet with these bodies."""
+    return data_packet(5, 7, {SIX_D_WITH_RESIDUAL: bodies})[HEADER.size :]
+
+
+WHOLE = data_of(*3 * [BODY.pack(1.0, 2.0, 3.0, *UNTURNED, 0.1)])
 
 
 # ---------------------------------------------------------------------- packets of Qualisys
@@ -85,8 +93,7 @@ def test_noise_is_an_error_or_nothing(content: bytes) -> None:
     ],
 )
 def test_nine_numbers_that_are_no_rotation_are_no_pose(rotation: tuple[float, ...]) -> None:
-    packet = data_packet(1, 1, [BODY.pack(1.0, 2.0, 3.0, *rotation, 0.1)])
-    _, _, (body,) = parsed_data(packet[HEADER.size :])
+    _, _, (body,) = parsed_data(data_of(BODY.pack(1.0, 2.0, 3.0, *rotation, 0.1)))
     assert not body.visible
 
 
@@ -171,14 +178,12 @@ def test_a_huge_message_is_not_taken_and_the_next_ones_are(
 
         def row_after(content: Callable[[], bytes], reason: ServerReason) -> None:
             """Publishes until a row has the reason."""
-            end = time.monotonic() + WAIT
-            while time.monotonic() < end:
+
+            def comes(row: Any) -> bool:
                 publisher.publish(content())
-                server.burst(1)
-                if server.latest().extended.reason == reason:
-                    return
-                time.sleep(0.001)
-            raise AssertionError(f"the rows stay {server.latest().extended.reason!r}")
+                return bool(row.reason == reason)
+
+            row_where(server, comes)
 
         def small() -> bytes:
             return Message(time.monotonic_ns(), None).encoded()

@@ -30,27 +30,26 @@ class Connection:
         pass
 
 
+def first_frame(device: str, *failures: Exception) -> Frame | None:
+    """The first frame after connections that fail like this."""
+    connections = map(Connection, failures)
+    stream = FrameStream(lambda: next(connections, Connection(None)), device)
+    stream.start()
+    try:
+        return stream.next(time.monotonic_ns() + WAIT)
+    finally:
+        stream.stop()
+
+
 @pytest.mark.parametrize(
     "failure", [OSError(), ValueError(), TypeError(), OverflowError(), AttributeError()]
 )
 def test_a_connection_that_fails_is_opened_again(failure: Exception) -> None:
-    connections = iter([Connection(failure)])
-    stream = FrameStream(lambda: next(connections, Connection(None)), "device")
-    stream.start()
-    try:
-        assert stream.next(time.monotonic_ns() + WAIT) is not None
-    finally:
-        stream.stop()
+    assert first_frame("device", failure) is not None
 
 
 def test_a_failure_is_told_once_and_so_is_its_end(capfd: pytest.CaptureFixture[str]) -> None:
-    connections = iter([Connection(OSError("no route"))] * 3)
-    stream = FrameStream(lambda: next(connections, Connection(None)), "camera system")
-    stream.start()
-    try:
-        assert stream.next(time.monotonic_ns() + WAIT) is not None
-    finally:
-        stream.stop()
+    assert first_frame("camera system", *3 * [OSError("no route")]) is not None
     told = capfd.readouterr().err.splitlines()
     assert told == [
         "o80: camera system: no route; tries again",

@@ -16,6 +16,7 @@ from o80_devices.motion_capture.qualisys import Qualisys, body_names
 from o80_devices.motion_capture.qualisys_packets import (
     BODY,
     HEADER,
+    SIX_D_WITH_RESIDUAL,
     Packets,
     Type,
     data_packet,
@@ -52,7 +53,7 @@ def test_a_body_is_parsed_in_metres_and_as_a_quaternion() -> None:
     columns = (c, s, 0, -s, c, 0, 0, 0, 1)  # turned by 0.5 about z
     body = BODY.pack(1000.0, -2000.0, 500.0, *columns, 0.5)
     unseen = BODY.pack(*[math.nan] * 13)
-    content = data_packet(123456, 7, [body, unseen])[HEADER.size :]
+    content = data_packet(123456, 7, {SIX_D_WITH_RESIDUAL: [body, unseen]})[HEADER.size :]
     stamp, number, (seen, hidden) = parsed_data(content)
     assert (stamp, number) == (123456, 7)
     assert seen.position == pytest.approx((1.0, -2.0, 0.5))
@@ -62,7 +63,7 @@ def test_a_body_is_parsed_in_metres_and_as_a_quaternion() -> None:
 
 
 def test_a_cut_packet_is_told() -> None:
-    content = data_packet(1, 1, [BODY.pack(*[0.0] * 13)])[HEADER.size :]
+    content = data_packet(1, 1, {SIX_D_WITH_RESIDUAL: [BODY.pack(*[0.0] * 13)]})[HEADER.size :]
     for length in range(len(content)):
         with pytest.raises(ValueError, match="a data packet is cut"):
             parsed_data(content[:length])
@@ -154,16 +155,14 @@ def test_a_pulled_cable_is_a_gap_and_is_reconnected(
     assert row_where(system, is_seen).racket.visible
 
 
-def test_the_gap_is_marked_after_100_ms_of_rows(server: FakeQualisys, segment: str) -> None:
-    with ROBOT.inline(segment, frequency=1000, port=server.port) as system:
-        row_where(system, is_seen)
-        server.faults.silent = True
-        row_where(system, lambda row: row.reason == Reason.SILENT)
-        rows = system.history(150)
-        reasons = np.asarray(rows.extended["reason"])
-        (silent,) = np.flatnonzero(reasons == Reason.SILENT)
-        last = np.flatnonzero(reasons == Reason.SEEN)[-1]
-        assert 80 <= silent - last <= 100
+def test_the_gap_is_marked_after_100_ms_of_rows(server: FakeQualisys, system: o80.Frontend) -> None:
+    row_where(system, is_seen)
+    server.faults.silent = True
+    row_where(system, lambda row: row.reason == Reason.SILENT)
+    reasons = np.asarray(system.history(150).extended["reason"])
+    (silent,) = np.flatnonzero(reasons == Reason.SILENT)
+    last = np.flatnonzero(reasons == Reason.SEEN)[-1]
+    assert 80 <= silent - last <= 100
 
 
 def test_a_server_that_restarts_is_a_new_epoch(server: FakeQualisys, system: o80.Frontend) -> None:
@@ -182,11 +181,16 @@ def test_bodies_that_are_added_are_asked_for_again(
     assert row.TT_Platte_1.position[2] == pytest.approx(2.0)
 
 
-def test_a_driver_whose_bodies_are_named_starts_before_the_server(segment: str) -> None:
+def test_a_driver_whose_bodies_are_named_starts_before_the_server(
+    segment: str, capfd: pytest.CaptureFixture[str]
+) -> None:
     with FakeQualisys() as unused:
         port = unused.port
     with ROBOT.inline(segment, frequency=1000, port=port, subjects="racket") as system:
         row_where(system, lambda row: row.reason == Reason.DISCONNECTED)
+        told = capfd.readouterr().err
+        assert f"o80: Qualisys at 127.0.0.1:{port}: " in told
+        assert "Connection refused; tries again" in told
         with FakeQualisys(port=port):
             row_where(system, is_seen)
 
@@ -221,19 +225,6 @@ def test_a_misspelled_subject_is_told_with_the_nearest_name(
     assert not rows[-1].rackett.visible
 
 
-def test_a_server_that_refuses_is_told_on_the_standard_error(
-    segment: str, capfd: pytest.CaptureFixture[str]
-) -> None:
-    with FakeQualisys() as unused:
-        port = unused.port
-    with ROBOT.inline(segment, frequency=1000, port=port, subjects="racket") as system:
-        row_where(system, lambda row: row.reason == Reason.DISCONNECTED)
-        row_where(system, lambda row: row.reason == Reason.DISCONNECTED)
-    told = capfd.readouterr().err
-    assert told.count(f"o80: Qualisys at 127.0.0.1:{port}: ") == 1
-    assert "Connection refused; tries again" in told
-
-
 def test_a_foreign_server_is_told(segment: str) -> None:
     with (
         answering(b"HTTP/1.1 400 no\r\n\r\n") as port,
@@ -243,10 +234,8 @@ def test_a_foreign_server_is_told(segment: str) -> None:
 
 
 def test_in_real_time_a_row_is_a_frame(server: FakeQualisys, segment: str) -> None:
-    port = server.port
-    robot = o80.robots.load("o80_devices.motion_capture:Qualisys")
     with (
-        robot.start(segment, frequency=200, port=port),
+        ROBOT.start(segment, frequency=200, port=server.port),
         o80.Frontend(segment) as system,
     ):
         system.wait_for(150, timeout=WAIT)

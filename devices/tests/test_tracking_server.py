@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from device_rows import WAIT, row_where
 
 import o80
 from o80_devices.ball_tracking.robot_and_ball import RobotAndBall
@@ -25,7 +26,6 @@ from o80_devices.cameras.rig import four_cameras
 from o80_devices.cameras.throws import Throws
 from o80_devices.fakes.tracking_server import FakeTrackingServer, thrown
 
-PATIENCE = 60.0  # [s] longer than anything here takes on any machine
 OFFSET = 1_669_000_000 * SECOND  # of the server's clock
 ROOT = Path(__file__).resolve().parent.parent.parent
 RECORDED = Path(os.environ.get("O80_DATA", ROOT.parent / "shared" / "data")) / "robot_and_ball_2022"
@@ -147,27 +147,24 @@ def test_thrown_balls_are_numbered_and_their_velocity_is_better_than_by_differen
     assert np.median(errors) < 0.2 * np.median(differences)
 
 
-def test_the_driver_takes_the_newest_message_and_marks_the_end_of_the_server() -> None:
-    with contextlib.closing(FakeTrackingServer("tcp://127.0.0.1:0")) as server:
-        _follow(server)
-
-
-def _follow(server: FakeTrackingServer) -> None:
-    tracker = o80.robots.load("o80_devices.ball_tracking.tracking_server:TrackingServer")
-    with tracker.inline(
-        "test-tracking-server", address=server.address, translation=(0.0, 0.0, 1.0)
-    ) as robot:
-        end = time.monotonic() + PATIENCE
-        stamp = 0
+def test_the_driver_takes_the_newest_message_and_marks_the_end_of_the_server(
+    segment: str,
+) -> None:
+    tracker = o80.robots.load(TrackingServer)
+    with (
+        contextlib.closing(FakeTrackingServer("tcp://127.0.0.1:0")) as server,
+        tracker.inline(segment, address=server.address, translation=(0.0, 0.0, 1.0)) as robot,
+    ):
+        end, stamp = time.monotonic() + WAIT, OFFSET
         while robot.latest().extended["reason"] != ServerReason.seen:
             assert time.monotonic() < end
             for _ in range(20):
                 stamp += SECOND // 180
-                server.publish(Message(OFFSET + stamp, np.array([0.1, 0.2, 0.3])))
+                server.publish(Message(stamp, np.array([0.1, 0.2, 0.3])))
             time.sleep(0.02)
             robot.burst(1)
         row = robot.latest().extended
-        assert row["stamp"] == OFFSET + stamp, "an older message was taken"
+        assert row["stamp"] == stamp, "an older message was taken"
         assert row["capture_time"] > 0
         np.testing.assert_allclose(row["measured"], [0.1, 0.2, 1.3])
         robot.burst(1)
@@ -175,9 +172,7 @@ def _follow(server: FakeTrackingServer) -> None:
         assert row["capture_time"] == 0
         assert np.isnan(row["position"]).all()
         server.close()
-        while robot.latest().extended["reason"] != ServerReason.silent:
-            assert time.monotonic() < end
-            robot.burst(1)
+        row_where(robot, lambda row: row.reason == ServerReason.silent)
 
 
 def test_a_line_that_is_no_row_is_named(tmp_path: Path) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from dataclasses import astuple, dataclass
-from typing import Any, ClassVar
+from functools import partial
+from typing import ClassVar
 
 import numpy as np
 
@@ -94,26 +95,22 @@ class BallLauncher:
         self._config = config
         self._wanted = self._known = State(config.phi, config.theta)
         self._halted = self._was_connected = False
-        self._zmq: Any = None
 
     # ------------------------------------------------------------------ verbs
 
     def start(self) -> None:
         Request(Kind.LAUNCH_BALL).encoded()  # reports a missing protobuf at the start
-        self._zmq = needed("zmq", "zeromq", "the ball launcher", package="o80-devices")
-        self._context = self._zmq.Context()
+        zmq = needed("zmq", "zeromq", "the ball launcher", package="o80-devices")
+        self._context = zmq.Context()
         config = self._config
-        self._link = Link(self._zmq, self._context, config.address, config.heartbeat_timeout)
+        self._link = Link(zmq, self._context, config.address, config.heartbeat_timeout)
         timing = Timing(
             deliver=round(config.deliver_timeout * SECOND),
             state=round(config.state_timeout * SECOND),
             launch=round(config.launch_timeout * SECOND),
         )
-        self._launcher = Launcher(self, timing)
-
-    def exchange(self, request: Request, deliver_by: int, wait: int) -> Exchange:
-        """Begins an exchange with the launcher."""
-        return Exchange(self._zmq, self._context, self._config.address, request, deliver_by, wait)
+        self._exchange = partial(Exchange, zmq, self._context, config.address)
+        self._launcher = Launcher(self._exchange, timing)
 
     def write(self, desired: Desired) -> None:
         if not self._halted:
@@ -161,7 +158,7 @@ class BallLauncher:
         self._known = self._wanted
 
     def stop(self) -> None:
-        if self._zmq is None or not hasattr(self, "_launcher"):
+        if not hasattr(self, "_launcher"):
             return
         replies = CONFIRMATIONS if self._launcher.may_hold_older_requests else 1
         self._launcher.close()
@@ -182,7 +179,7 @@ class BallLauncher:
         """Whether the launcher confirms stopped motors before `end` [ns]."""
         now = time.monotonic_ns()
         state = State(self._wanted.phi, self._wanted.theta)
-        last = self.exchange(Request(Kind.SET_STATE, state), end, max(0, end - now))
+        last = self._exchange(Request(Kind.SET_STATE, state), end, max(0, end - now))
         while last.poll(now) is Outcome.pending and now < end:
             time.sleep(POLL)
             now = time.monotonic_ns()

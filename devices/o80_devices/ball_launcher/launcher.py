@@ -10,9 +10,9 @@ motors.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Protocol
 
 from o80.errors import RequestRejected
 from o80_devices.ball_launcher.exchange import Exchange, Outcome
@@ -62,17 +62,14 @@ class Timing:
     """Interval between attempts to set a state that was refused or not answered."""
 
 
-class Wire(Protocol):
-    """Opens exchanges with the launcher."""
-
-    def exchange(self, request: Request, deliver_by: int, wait: int) -> Exchange: ...
-
-
 class Launcher:
     """Keeps the launcher in the wanted state, and launches on request."""
 
-    def __init__(self, wire: Wire, timing: Timing = Timing()) -> None:
-        self._wire = wire
+    def __init__(
+        self, exchange: Callable[[Request, int, int], Exchange], timing: Timing = Timing()
+    ) -> None:
+        """exchange: opens an exchange. Arguments: deadline of the connection, timeout [ns]."""
+        self._open = exchange
         self._timing = timing
         self._exchange: Exchange | None = None
         self._kind = Kind.SET_STATE
@@ -204,7 +201,7 @@ class Launcher:
         request = Request(kind, self._sending if kind is Kind.SET_STATE else None)
         self._kind = kind
         self._began_unknown = now < self._unknown_until
-        self._exchange = self._wire.exchange(request, now + self._timing.deliver, wait)
+        self._exchange = self._open(request, now + self._timing.deliver, wait)
 
     def _take_state(self, outcome: Outcome, now: int) -> None:
         if outcome is Outcome.done and self._connected:

@@ -10,7 +10,7 @@ The reply is one byte: 1 done, 0 failed.
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import asdict, astuple, dataclass
 from enum import IntEnum
 from functools import cache
 from typing import Any
@@ -20,7 +20,6 @@ import numpy as np
 from o80.base.extras import needed
 
 NAMES = ("phi", "theta", "top_left_motor", "top_right_motor", "bottom_motor")
-DEFAULTS = (0.5, 0.5, 0.0, 0.0, 0.0)
 DONE = (b"1", b"\x01")
 REFUSED = (b"0", b"\x00")
 
@@ -59,7 +58,7 @@ class Request:
 
     def encoded(self) -> bytes:
         """Encodes the message."""
-        message = _types()["Request"]()
+        message = _request()()
         message.request = int(self.kind)
         if self.state is not None:
             for name, value in zip(NAMES, astuple(self.state), strict=True):
@@ -72,7 +71,7 @@ class Request:
         """Decodes a message. Raises ValueError if the bytes are no message."""
         from google.protobuf.message import DecodeError
 
-        message = _types()["Request"]()
+        message = _request()()
         try:
             message.ParseFromString(content)
         except DecodeError as error:
@@ -86,7 +85,8 @@ class Request:
 
 
 @cache
-def _types() -> dict[str, Any]:
+def _request() -> Any:
+    """Class of the message `Request`."""
     descriptor_pb2, descriptor_pool, message_factory = (
         needed(f"google.protobuf.{name}", "zeromq", "the ball launcher", package="o80-devices")
         for name in ("descriptor_pb2", "descriptor_pool", "message_factory")
@@ -99,7 +99,7 @@ def _types() -> dict[str, Any]:
         kinds.value.add(name=kind.name, number=kind.value)
     field = descriptor_pb2.FieldDescriptorProto
     state = file.message_type.add(name="State")
-    for number, (name, default) in enumerate(zip(NAMES, DEFAULTS, strict=True), start=1):
+    for number, (name, default) in enumerate(asdict(State()).items(), start=1):
         state.field.add(
             name=name,
             number=number,
@@ -124,9 +124,4 @@ def _types() -> dict[str, Any]:
     )
     pool = descriptor_pool.DescriptorPool()
     pool.Add(file)
-    return {
-        name: message_factory.GetMessageClass(
-            pool.FindMessageTypeByName(f"o80_ball_launcher.{name}")
-        )
-        for name in ("State", "Request")
-    }
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName("o80_ball_launcher.Request"))

@@ -68,8 +68,8 @@ class Tracker:
         options = self.options
         to_begin = min(options.least_to_begin, len(self.cameras))
         expected, _ = self._track.expected(time)
-        found = None
-        if len(np.unique(sightings[:, 0])) >= 2:
+        found, some = None, len(np.unique(sightings[:, 0])) >= 2
+        if some:
             found = _vision.locate(
                 self.cameras,
                 np.ascontiguousarray(sightings),
@@ -80,7 +80,6 @@ class Tracker:
                 expected=expected,
             )
         if found is None:
-            some = len(np.unique(sightings[:, 0])) >= 2
             return self._track.lost(time, Reason.no_agreement if some else Reason.not_found)
         enough = found[2].bit_count() >= to_begin
         return self._track.seen(time, *found, may_surprise=enough)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from o80.base.arrays import FloatArray
 from o80.base.extras import needed
 from o80.errors import InvalidArgument
 from o80_devices import _vision
-from o80_devices.calibration.board import PURPOSE
+from o80_devices.calibration.board import PURPOSE, opencv
 from o80_devices.cameras.rig import RigCamera
 
 MIN_SHARED = 20
@@ -26,8 +25,8 @@ def first_places(lenses: Sequence[RigCamera], waved: FloatArray) -> list[RigCame
     The two cameras with most common moments are placed by their essential matrix, each other
     one by the points triangulated so far (perspective of n points).
     """
-    cv2: Any = needed("cv2", "cameras", PURPOSE, package="o80-devices")
-    flat = [without_place(lens) for lens in lenses]
+    cv2 = opencv()
+    flat = [lens.moved(np.eye(3), np.zeros(3)) for lens in lenses]
     seen: NDArray[np.bool_] = np.asarray(np.isfinite(waved).all(-1))
     shared = seen.T.astype(int) @ seen.astype(int)
     np.fill_diagonal(shared, 0)
@@ -132,8 +131,3 @@ def triangulated(cameras: Sequence[RigCamera], pixels: FloatArray) -> FloatArray
         if found is not None:
             points[i] = found[0]
     return points
-
-
-def without_place(camera: RigCamera) -> RigCamera:
-    """Returns the camera at the origin, unturned."""
-    return replace(camera, rotation=tuple(np.eye(3).ravel().tolist()), translation=(0.0, 0.0, 0.0))

@@ -12,6 +12,7 @@ import argparse
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -78,11 +79,8 @@ def live_lenses(given: argparse.Namespace, board: boards.Board) -> list[lenses.L
         )
     cameras = [RigCamera(name, given.size, (1.0, 1.0), (0.0, 0.0)) for name in names]
     count = max(given.pictures, lenses.MIN_FOUND)
-    source = source_of(given.segment, cameras)
-    try:
+    with closing(source_of(given.segment, cameras)) as source:
         found = lenses.boards_from_segments(source, cameras, board, count, say=progress)
-    finally:
-        source.close()
     print(file=sys.stderr)
     return [
         lenses.lens_from_boards(camera.name, camera.size, seen, board, of=len(seen))
@@ -95,11 +93,10 @@ def live_lenses(given: argparse.Namespace, board: boards.Board) -> list[lenses.L
 
 def save_pictures(given: argparse.Namespace) -> None:
     cameras = lenses.load(given.lenses)
-    source = source_of(given.segment, cameras)
     missing = {camera.name for camera in cameras}
-    end = time.monotonic() + ATTACHING
-    given.output.mkdir(parents=True, exist_ok=True)
-    try:
+    with closing(source_of(given.segment, cameras)) as source:
+        given.output.mkdir(parents=True, exist_ok=True)
+        end = time.monotonic() + ATTACHING
         while missing:
             source.wait(0.1)
             images = source.read()
@@ -110,8 +107,6 @@ def save_pictures(given: argparse.Namespace) -> None:
                     missing.discard(camera.name)
             if missing and time.monotonic() > end:
                 raise TimeoutError(f"no image came from {', '.join(sorted(missing))}")
-    finally:
-        source.close()
     print(f"written: {len(cameras)} pictures in {given.output}")
 
 
@@ -123,8 +118,7 @@ def record_wave(given: argparse.Namespace) -> None:
         raise InvalidArgument(f"--moments must be positive, got {given.moments}")
     cameras = lenses.load(given.lenses)
     colours = colour.load(given.colours) if given.colours else None
-    source = source_of(given.segment, cameras)
-    try:
+    with closing(source_of(given.segment, cameras)) as source:
         waved = collected(
             source,
             [camera.name for camera in cameras],
@@ -132,8 +126,6 @@ def record_wave(given: argparse.Namespace) -> None:
             finder=BallFinder(colours),
             say=lambda count: progress(f"{count} of {given.moments} moments"),
         )
-    finally:
-        source.close()
     print(file=sys.stderr)
     for camera, seen in zip(cameras, np.isfinite(waved.pixels).all(-1).sum(0), strict=True):
         print(f"{camera.name:16} saw the ball in {seen} moments")
@@ -152,25 +144,26 @@ def calibrate_places(given: argparse.Namespace) -> None:
     pixels = corners.of(names)
     fit, held_out = waved.parts()
     placed = extrinsics.places_from_ball(cameras, fit, corners.table.corners, pixels)
-    rig = Rig(placed.cameras, table=corners.table)
+    rig = Rig(placed, table=corners.table)
     rig.check()
-    tell_places(placed, held_out)
-    tell_corners(placed.cameras, corners.table.corners, pixels)
+    tell_places(placed, fit, held_out)
+    tell_corners(placed, corners.table.corners, pixels)
     rig.save(given.output)
     print(f"written: {given.output}")
 
 
-def tell_places(placed: extrinsics.Calibrated, held_out: FloatArray) -> None:
+def tell_places(cameras: Sequence[RigCamera], fit: FloatArray, held_out: FloatArray) -> None:
     print("camera                x [m]    y [m]    z [m]")
-    for camera in placed.cameras:
+    for camera in cameras:
         print("{:16} {:8.3f} {:8.3f} {:8.3f}".format(camera.name, *camera.place))
-    found = np.isfinite(bundle.triangulated(placed.cameras, held_out)).all(1).sum()
-    print(f"reprojection of the moments that were fitted: {placed.residual:.3f} px")
+    found = np.isfinite(bundle.triangulated(cameras, held_out)).all(1).sum()
+    away = extrinsics.reprojection(cameras, fit)
+    print(f"reprojection of the moments that were fitted: {away:.3f} px")
     if found:
-        away = extrinsics.reprojection(placed.cameras, held_out)
+        away = extrinsics.reprojection(cameras, held_out)
         print(f"reprojection of those that were held out:     {away:.3f} px")
     print(f"{len(held_out) - found} of {len(held_out)} held-out moments do not fit")
-    moved = 1e3 * extrinsics.left_out_distances(placed.cameras, held_out)
+    moved = 1e3 * extrinsics.left_out_distances(cameras, held_out)
     if len(moved):
         mean, most = moved.mean(), np.percentile(moved, 95)
         print(f"a held-out place, with and without one of its cameras: {mean:.1f} mm apart")

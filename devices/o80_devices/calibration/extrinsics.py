@@ -8,7 +8,6 @@ images, then determine the scale and the world frame. Needs the extra `cameras`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,25 +23,16 @@ MIN_DEPTH = 0.02
 """Least ratio of the smallest extent of the ball's places to the largest one."""
 
 
-@dataclass(frozen=True)
-class Calibrated:
-    """Calibrated cameras and their residual."""
-
-    cameras: tuple[RigCamera, ...]
-    residual: float
-    """Root mean square reprojection error [px]."""
-
-
 def places_from_ball(
     lenses: Sequence[RigCamera],
     waved: FloatArray,
     corners: FloatArray,
     corner_pixels: FloatArray,
-) -> Calibrated:
-    """Calibrates the places of cameras with known lenses.
+) -> tuple[RigCamera, ...]:
+    """Returns cameras with known lenses at their places in the world.
 
     waved: (moments, cameras, 2) the ball in each image [px]; NaN: not seen.
-    corners: (n, 3) in the world [m], at least 3, not in one line.
+    corners: (n, 3) of the table in the world [m], at least 3, at one height, not in one line.
     corner_pixels: (cameras, n, 2) the corners in each image [px]; NaN: not seen. Only corners
     seen by at least two cameras count.
     Raises InvalidArgument for too little motion or wrong corners, MissingExtra.
@@ -54,8 +44,7 @@ def places_from_ball(
     seen = triangulated(cameras, marks)
     known: NDArray[np.bool_] = np.asarray(np.isfinite(seen).all(1))
     _check_corners(lenses, marks, known)
-    placed = in_world(cameras, seen[known], corners[known])
-    return Calibrated(placed, reprojection(placed, waved))
+    return in_world(cameras, seen[known], corners[known])
 
 
 def _check_depth(cameras: Sequence[RigCamera], waved: FloatArray) -> None:

@@ -14,8 +14,6 @@ from o80_devices.motion_capture.transform import rotation_between
 
 WORST_FIT = 0.02
 """Largest distance of a point from its known place, as a share of the extent of all points."""
-FLAT = 1e-6
-"""Points are in a plane if their third extent is below this share of the first."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +50,7 @@ def in_world(
 ) -> tuple[RigCamera, ...]:
     """Moves, turns and scales the cameras so that the seen points match the known ones.
 
+    known: points at one height.
     Raises InvalidArgument if the points do not fit, or if they are mirrored.
     """
     similarity = Similarity.between(seen, known)
@@ -70,11 +69,7 @@ def in_world(
 
 def _check_not_mirrored(cameras: Sequence[RigCamera], known: FloatArray) -> None:
     """Raises InvalidArgument for mirrored corners, which fit a rig that is upside down."""
-    _, sizes, axes = np.linalg.svd(known - known.mean(0))
-    if len(sizes) > 2 and sizes[2] > FLAT * sizes[0]:
-        return
-    upwards = axes[2] * np.sign(axes[2][2] or 1.0)
-    below = [camera.name for camera in cameras if (camera.place - known.mean(0)) @ upwards < 0]
+    below = [camera.name for camera in cameras if camera.place[2] < known[:, 2].mean()]
     if below:
         raise InvalidArgument(
             f"{below[0]} would be below the table: the corners are mirrored. Mark them "

@@ -14,15 +14,10 @@ PixelFormat = Literal["BayerRG8", "BayerGB8", "BayerGR8", "BayerBG8", "RGB8", "B
 PATTERNS = {"BayerRG8": "RGGB", "BayerGB8": "GBRG", "BayerGR8": "GRBG", "BayerBG8": "BGGR"}
 
 
-def channels_of(pixel_format: PixelFormat) -> int:
-    """Number of bytes of a pixel."""
-    return 3 if pixel_format in ("RGB8", "BGR8") else 1
-
-
 def rgb_of(content: Image, size: tuple[int, int], pixel_format: PixelFormat) -> Image:
     """Decodes an image (height, width, 3). Raises ValueError for a wrong size, MissingExtra."""
     width, height = size
-    channels = channels_of(pixel_format)
+    channels = 3 if pixel_format in ("RGB8", "BGR8") else 1
     if content.size < width * height * channels:
         raise ValueError(
             f"an image of {content.size} bytes is too small for {width} x {height} pixels of "

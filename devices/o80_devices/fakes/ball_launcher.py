@@ -7,7 +7,6 @@ python -m o80_devices.fakes.ball_launcher --tracking tcp://127.0.0.1:7660
 from __future__ import annotations
 
 import contextlib
-import errno
 import socket
 import time
 from collections.abc import Callable
@@ -86,27 +85,18 @@ class FakeLauncher:
 
     def bind(self, address: str) -> str:
         """Listens, and returns the address; port 0 takes any free port."""
-        self._socket = self._context.socket(self._zmq.REP)
-        self._socket.setsockopt(self._zmq.LINGER, 0)
-        end = time.monotonic() + FREED_WITHIN
-        while True:
-            try:
-                self._socket.bind(address)
-                break
-            except self._zmq.ZMQError as error:
-                if error.errno != errno.EADDRINUSE or time.monotonic() > end:
-                    raise
-                time.sleep(0.005)  # ZeroMQ closes the previous socket in the background
-        bound: str = self._socket.getsockopt(self._zmq.LAST_ENDPOINT).decode().rstrip("\0")
+        made = self._context.socket(self._zmq.REP)
+        made.setsockopt(self._zmq.LINGER, 0)
+        made.bind(address)
+        bound: str = made.getsockopt(self._zmq.LAST_ENDPOINT).decode().rstrip("\0")
+        self._socket, self._bound = made, bound
         return bound
 
     def die(self) -> None:
         """Drops connections, the open request and the state."""
         if self._socket is not None:
-            bound = self._socket.getsockopt(self._zmq.LAST_ENDPOINT).decode().rstrip("\0")
             self._socket.close(linger=0)
-            if bound:
-                _wait_until_closed(bound)
+            _wait_until_closed(self._bound)
         self._socket, self._busy, self.state = None, None, State()
 
     def close(self) -> None:

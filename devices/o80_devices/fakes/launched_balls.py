@@ -80,10 +80,7 @@ class TrackedLauncher:
         self._server.close()
 
     def _run(self) -> None:
-        due = time.monotonic()
-        while not self._stopping.is_set():
+        while not self._stopping.wait(1 / RATE):
             with self._lock:
                 message = self._balls.message(time.monotonic_ns())
             self._server.publish(message)
-            due = max(due + 1 / RATE, time.monotonic())
-            self._stopping.wait(max(0.0, due - time.monotonic()))

@@ -22,7 +22,7 @@ from o80_devices.motion_capture.qualisys_packets import (
     VERSION,
     Packets,
     Type,
-    components_packet,
+    data_packet,
     packet,
     words_of,
 )
@@ -236,7 +236,7 @@ class FakeQualisys:
             COMPONENTS[name]: [packed(pose, name) for pose in poses] if name[0] == "6" else []
             for name in components
         }
-        return components_packet(round(now * 1e6), number, listed)
+        return data_packet(round(now * 1e6), number, listed)
 
     def _pose(self, index: int, now: float) -> Pose | None:
         if self._poses is not None:

@@ -44,12 +44,10 @@ class QualisysConnection:
             self._expect(Type.COMMAND, "Version set")
             self._packets.send(Type.COMMAND, "GetParameters 6D")
             self.names = body_names(self._expect(Type.XML, ""))
+            self._packets.send(Type.COMMAND, "StreamFrames AllFrames 6DRes")
         except BaseException:
             self._packets.close()
             raise
-
-    def stream(self) -> None:
-        self._packets.send(Type.COMMAND, "StreamFrames AllFrames 6DRes")
 
     def receive(self, timeout: float) -> Frame | None:
         found = self._packets.receive(timeout)
@@ -99,7 +97,7 @@ class QualisysFrames(FrameStream):
     tick = TICK
 
     def __init__(self, host: str, port: int) -> None:
-        super().__init__(self._opened, f"Qualisys at {host}:{port}")
+        super().__init__(lambda: QualisysConnection(host, port), f"Qualisys at {host}:{port}")
         self._host = host
         self._port = port
 
@@ -115,15 +113,6 @@ class QualisysFrames(FrameStream):
             ) from error
         connection.close()
         return connection.names
-
-    def _opened(self) -> QualisysConnection:
-        connection = QualisysConnection(self._host, self._port)
-        try:
-            connection.stream()
-        except BaseException:
-            connection.close()
-            raise
-        return connection
 
 
 class Qualisys(Sensor):

@@ -98,13 +98,8 @@ class Packets:
         return kind, content
 
 
-def data_packet(stamp: int, number: int, bodies: Sequence[bytes]) -> bytes:
-    """Builds a data packet. stamp: [us]. bodies: each packed by BODY."""
-    return components_packet(stamp, number, {SIX_D_WITH_RESIDUAL: bodies})
-
-
-def components_packet(stamp: int, number: int, components: Mapping[int, Sequence[bytes]]) -> bytes:
-    """Builds a data packet. stamp: [us]. components: content of each component type."""
+def data_packet(stamp: int, number: int, components: Mapping[int, Sequence[bytes]]) -> bytes:
+    """Builds a data packet. stamp: [us]. components: content of each type, such as BODY each."""
     parts = [DATA.pack(stamp, number, len(components))]
     for kind, each in components.items():
         content = BODIES.pack(len(each), 0, 0) + b"".join(each)

@@ -10,20 +10,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80.base.finite import json_text
 from o80.errors import InvalidArgument
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Transform:
     """p_world = rotation p + translation."""
 
-    rotation: Array  #: (3, 3)
-    translation: Array  #: (3,) [m]
+    rotation: FloatArray  #: (3, 3)
+    translation: FloatArray  #: (3,) [m]
     residuals: Mapping[str, float]  #: residual of the points of the estimate [m]
 
     @classmethod
@@ -84,8 +82,8 @@ class Transform:
         }
         file.write_text(json_text(content, indent=2) + "\n")
 
-    def of_point(self, point: Sequence[float]) -> Array:
-        moved: Array = self.rotation @ np.asarray(point, float) + self.translation
+    def of_point(self, point: Sequence[float]) -> FloatArray:
+        moved: FloatArray = self.rotation @ np.asarray(point, float) + self.translation
         return moved
 
     def of_pose(
@@ -96,7 +94,7 @@ class Transform:
         return tuple(self.of_point(position).tolist()), turned
 
 
-def rotation_between(source: Array, target: Array) -> tuple[Array, float] | None:
+def rotation_between(source: FloatArray, target: FloatArray) -> tuple[FloatArray, float] | None:
     """Rotation (3, 3), and scale, that fit points (n, 3) to others best, each about its mean.
 
     None for points on a line. (Umeyama, 1991)
@@ -110,7 +108,7 @@ def rotation_between(source: Array, target: Array) -> tuple[Array, float] | None
     return left @ np.diag(mirror) @ right, float((sizes * mirror).sum() / (apart**2).sum())
 
 
-def quaternion_of(rotation: Array) -> tuple[float, ...]:
+def quaternion_of(rotation: FloatArray) -> tuple[float, ...]:
     """Converts a rotation matrix to x, y, z, w with w >= 0; computes the largest one first."""
     (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
     squares = [1 + a - e - i, 1 - a + e - i, 1 - a - e + i, 1 + a + e + i]  # 4 x^2, 4 y^2, ...
