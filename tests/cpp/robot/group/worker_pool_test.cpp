@@ -130,8 +130,8 @@ TEST(WorkerPoolTest, WaitsForNoWorkerInAChildThatWasForkedWithinACall) {
 }
 
 TEST(WorkerPoolTest, EndsTheThreadsThatItHasStartedIfTheOthersCannotBe) {
-#ifdef __SANITIZE_THREAD__
-  GTEST_SKIP() << "needs a limit of memory, which the sanitizer does not survive";
+#ifdef O80_TEST_SANITIZED
+  GTEST_SKIP() << "needs a limit of memory, which a sanitizer does not survive";
 #endif
   const pid_t child = fork();
   if (child == 0) {
