@@ -25,9 +25,7 @@ struct FaultText {
 /// Stores as much of a text as fits, and a zero behind it.
 template <std::size_t Size>
 void store_text(char (&to)[Size], std::string_view text) noexcept {
-  const std::size_t size = text.size() < Size ? text.size() : Size - 1;
-  if (size > 0) std::memcpy(to, text.data(), size);
-  to[size] = 0;
+  to[text.copy(to, Size - 1)] = 0;
 }
 
 /// One option with which a robot can be started.
