@@ -162,3 +162,10 @@ def test_a_wrong_rig_is_refused_with_its_fault(tmp_path: Path, text: str, wrong:
 def test_a_rig_without_a_law_of_flight_is_refused(part: dict[str, Any], wrong: str) -> None:
     with pytest.raises(ValueError, match=wrong):
         replace(four_cameras(), **part).check()
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-200, -1.0, np.nan, np.inf])
+@pytest.mark.parametrize("name", ["noise", "tolerance"])
+def test_a_tracker_that_could_agree_on_no_place_is_refused(name: str, value: float) -> None:
+    with pytest.raises(o80.InvalidArgument, match=f"{name} must be from 1e-06 to 1e\\+06 px"):
+        BallTracker(replace(BallTracker.Config(), **{name: value}))

@@ -75,6 +75,7 @@ def test_a_message_that_is_none_is_marked_and_the_next_one_is_taken(content: byt
     "options",
     [
         {"noise": 0.0},
+        {"noise": 1e-200},
         {"timeout": math.nan},
         {"latency": -0.001},
         {"latency": math.inf},

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80.base.arrays import FloatArray, Image
+from o80.errors import InvalidArgument
 from o80_devices import _vision
 from o80_devices.ball_tracking import colour
 from o80_devices.ball_tracking.ball_row import Reason
@@ -31,6 +32,14 @@ class TrackerOptions:
     """Cameras that must agree on a new ball or on a hit, if the rig has so many."""
     forget: float = 0.3
     """Time without a sighting after which the next sighting starts a new ball [s]."""
+
+    def __post_init__(self) -> None:
+        """Raises InvalidArgument."""
+        for name in ("tolerance", "noise"):
+            if not 1e-6 <= getattr(self, name) <= 1e6:
+                raise InvalidArgument(
+                    f"{name} must be from 1e-06 to 1e+06 px, got {getattr(self, name):g}"
+                )
 
 
 class Tracker:

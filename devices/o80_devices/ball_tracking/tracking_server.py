@@ -34,8 +34,8 @@ class TrackingServer:
 
     def __init__(self, config: Options) -> None:
         for name in ("noise", "timeout", "max_age", "forget"):
-            if not 0.0 < getattr(config, name) < 1e6:
-                raise o80.InvalidArgument(f"{name} must be positive, got {getattr(config, name):g}")
+            if not 1e-9 <= (value := getattr(config, name)) <= 1e6:
+                raise o80.InvalidArgument(f"{name} must be from 1e-09 to 1e+06, got {value:g}")
         if not 0.0 <= config.latency < 1e6:
             raise o80.InvalidArgument(f"latency must be at least 0 s, got {config.latency:g}")
         for name in ("translation", "rotation"):
