@@ -167,5 +167,6 @@ def test_a_rig_without_a_law_of_flight_is_refused(part: dict[str, Any], wrong: s
 @pytest.mark.parametrize("value", [0.0, 1e-200, -1.0, np.nan, np.inf])
 @pytest.mark.parametrize("name", ["noise", "tolerance"])
 def test_a_tracker_that_could_agree_on_no_place_is_refused(name: str, value: float) -> None:
+    options: dict[str, Any] = {name: value}
     with pytest.raises(o80.InvalidArgument, match=f"{name} must be from 1e-06 to 1e\\+06 px"):
-        BallTracker(replace(BallTracker.Config(), **{name: value}))
+        BallTracker(BallTracker.Config(**options))

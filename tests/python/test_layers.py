@@ -210,7 +210,7 @@ CEILINGS = {
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_476, 0),
     "python/o80/view/page": (1_209, 0),
     "docs": (565, 0),
-    "devices": (8_293, 4_324),
+    "devices": (8_293, 4_325),
     "gateways/lerobot": (529, 686),
     "gateways/ros2": (903, 955),
     "robots/arms": (4_565, 3_153),
