@@ -1,4 +1,4 @@
-"""Rows of a device that is burst in this process, and a server that is none."""
+"""Rows of a device that bursts in this process, and a server that sends fixed bytes."""
 
 import contextlib
 import socket

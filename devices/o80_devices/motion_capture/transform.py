@@ -28,7 +28,7 @@ class Transform:
     def estimated(
         cls, measured: Mapping[str, Sequence[float]], known: Mapping[str, Sequence[float]]
     ) -> Transform:
-        """Fits the rigid transform from measured points to known ones .
+        """Fits the rigid transform from measured points to known ones.
 
         Raises InvalidArgument for fewer than three common points, or points on a line.
         """

@@ -125,7 +125,10 @@ def episodes_of(
             own = period * step, _names(run.epoch.schema, episode.sensors)
             form = form or own
             if own != form:
-                raise InvalidArgument("it has another frequency or other numbers than the first")
+                raise InvalidArgument(
+                    "its run has another frequency or other numbers than that of the first "
+                    "episode: cut the recording between them (o80 cut), and export each part"
+                )
             found.append(episode)
         except InvalidArgument as error:
             left_out.append(f"{where}: {error}")

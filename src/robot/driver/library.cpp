@@ -35,7 +35,7 @@ fs::path bundled_folder() {
   return library.parent_path() / "o80" / "robots";
 }
 
-/// Those of O80_ROBOT_PATH first.
+/// Folders in which robots are found by name, those of O80_ROBOT_PATH first.
 std::vector<std::string> robot_folders() {
   std::vector<std::string> folders;
   if (const char* given = secure_getenv("O80_ROBOT_PATH"); given != nullptr) {
