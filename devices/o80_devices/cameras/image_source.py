@@ -97,7 +97,7 @@ class ImageSource:
         self.wait_until(time.monotonic_ns() + round(timeout * 1e9))
 
     def wait_until(self, deadline: int) -> bool:
-        """Waits for images of the first segment, until a deadline [ns]. Returns whether any came."""
+        """Waits for images of the first segment until a deadline [ns]; returns whether any came."""
         came = self._segments[0].wait((deadline - time.monotonic_ns()) * 1e-9)
         if not came:
             time.sleep(max(0, deadline - time.monotonic_ns()) * 1e-9)
