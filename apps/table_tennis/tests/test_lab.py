@@ -101,9 +101,10 @@ def test_balls_are_played_and_reported(tmp_path: Path) -> None:
     # a busy machine may take no image of a flight
     tracking = report["tracking_error_mm"]
     tracked = tracking and tracking["at the time of the images"]
+    is_late = any(each["missed_percent"] > 0.0 for each in report["processes"].values())
     for found in (report["motion_capture_error_mm"], tracked):
         assert found is None or found["50%"] < 5.0
-        assert found or report["processes"][ARM]["missed_percent"] > 1.0, "this machine kept up"
+        assert found or is_late, "this machine kept up"
     marks = {(mark.name, *mark.rows) for mark in o80.open(tmp_path / "run.mcap").marks}
     launches = {name for name, _ in marks}
     assert len(launches) == 2
